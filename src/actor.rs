@@ -5,7 +5,7 @@ use crate::payload::Message;
 use crate::topology::Accepted;
 
 pub(crate) mod address;
-pub(crate) mod boxed;
+mod boxed;
 pub(crate) mod context;
 
 pub use address::{Address, Recipient, Target};

@@ -306,6 +306,7 @@ pub(crate) enum Verdict {
 
 impl Verdicts {
     /// One copy arrives after `delay`.
+    #[inline]
     pub fn deliver(&mut self, delay: SimDuration) {
         self.list.push(Verdict::Deliver {
             after: delay,
@@ -315,6 +316,7 @@ impl Verdicts {
 
     /// One copy arrives `delay` from now, carried so: from the sending to then, it takes
     /// [`Carriage::total`].
+    #[inline]
     pub fn deliver_as(&mut self, delay: SimDuration, carriage: Carriage) {
         self.list.push(Verdict::Deliver {
             after: delay,

@@ -22,7 +22,7 @@ use crate::fault::{Fault, FaultCause, Outcome};
 use crate::guard::{dropped, guarded};
 use crate::ids::{EntityId, KindIndex};
 use crate::key::{Bound, EventKey};
-use crate::queue::Entry;
+use crate::queue::{BATCH, Entry};
 use crate::record::RecordClass;
 use crate::time::SimTime;
 use crate::topology::Topology;
@@ -83,6 +83,8 @@ pub(crate) enum Action {
 pub(crate) struct Engine {
     actors: Vec<ActorCell>,
     pub(crate) parts: Parts,
+    /// After so many events is fetched what the next ones need.
+    until_fetch: usize,
 }
 
 impl Engine {
@@ -95,6 +97,7 @@ impl Engine {
         let mut engine = Engine {
             actors,
             parts: Parts::new(topology, index, links),
+            until_fetch: BATCH,
         };
         for cell in &mut engine.actors {
             let key =
@@ -138,7 +141,7 @@ impl Engine {
     pub(crate) fn run(&mut self, bound: Bound, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
         while !sink.paused() && self.parts.stop.is_none() {
             if self.parts.outbox.is_full() {
-                self.queue_sent();
+                self.queue_fetched();
             }
             let before = self.parts.outbox.before(bound);
             let Some(entry) = self.parts.queue.pop_before(before) else {
@@ -148,46 +151,76 @@ impl Engine {
                 self.queue_sent();
                 continue;
             };
-            if self.parts.queue.has_unread() && self.parts.store.is_large() {
-                self.read_ahead();
+            self.until_fetch = self.until_fetch.wrapping_sub(1);
+            if self.until_fetch == 0 {
+                self.fetch_ahead();
             }
             self.handle(entry, sink)?;
         }
         Ok(())
     }
 
-    /// Reads what the next few events will need. They lie anywhere in memory; read one after the
-    /// other, when each is handled, every miss of the cache would be waited for. Read here, where no
-    /// read depends on the one before, a processor waits for many of them at once.
+    /// Fetches what the next events will need. It lies anywhere in memory, and one thing says where the
+    /// next is: an event names its receiver, whose cell holds the actor. So each is fetched a batch of
+    /// events before what it leads to. In batches, since a processor that has to look up a page waits
+    /// for that, but looks up several at once.
     #[inline(never)]
-    fn read_ahead(&mut self) {
+    fn fetch_ahead(&mut self) {
         let Parts {
             queue,
             store,
             topology,
             ..
         } = &mut self.parts;
-        let entries = queue.unread();
-        let mut read = 0;
-        for entry in entries {
-            read ^= store.receiver(entry.slot).0;
-            read ^= u32::from(store.has_letter(entry.slot));
+        self.until_fetch = BATCH;
+        if !store.is_large() {
+            return;
         }
-        let mut counts = u64::from(read);
-        for entry in entries {
-            let receiver = store.receiver(entry.slot);
-            let local = topology.place(receiver).local as usize;
-            // Not every event is an actor's.
-            if let Some(cell) = self.actors.get(local) {
-                counts ^= cell.read_ahead();
-            }
+        queue.look_ahead();
+        // Not every event is an actor's.
+        let cell = |entry: &Entry| {
+            let place = topology.place(store.receiver(entry.slot));
+            self.actors.get(place.local as usize)
+        };
+        for cell in queue.batch(0).iter().filter_map(cell) {
+            cell.fetch_actor();
         }
-        std::hint::black_box(counts);
+        for cell in queue.batch(1).iter().filter_map(cell) {
+            cell.fetch();
+        }
+        for entry in queue.batch(2) {
+            store.fetch(entry.slot);
+        }
     }
 
     /// Numbers and queues what was sent; see [`Outbox`](outbox::Outbox).
-    #[inline(never)]
     fn queue_sent(&mut self) {
+        let all = self.parts.outbox.len();
+        self.queue_first(all);
+    }
+
+    /// Fetches what numbering and queuing what was sent last will need, and numbers and queues that for
+    /// which this was done before.
+    #[inline(never)]
+    fn queue_fetched(&mut self) {
+        let Parts {
+            topology,
+            queue,
+            outbox,
+            ..
+        } = &mut self.parts;
+        for message in outbox.unfetched() {
+            let receiver = topology.declared[message.declared as usize];
+            let sender = &self.actors[message.sender as usize];
+            sender.state.fetch_flow(receiver, message.kind);
+            queue.fetch(&message.entry);
+        }
+        let fetched = self.parts.outbox.fetched();
+        self.queue_first(fetched);
+        self.parts.outbox.all_fetched();
+    }
+
+    fn queue_first(&mut self, messages: usize) {
         let Parts {
             topology,
             queue,
@@ -195,22 +228,14 @@ impl Engine {
             outbox,
             ..
         } = &mut self.parts;
-        // Each of these reads misses the cache, and none depends on those for the message before.
-        let mut read = 0;
-        for message in outbox.iter() {
-            let receiver = topology.declared[message.declared as usize];
-            let sender = &self.actors[message.sender as usize];
-            read ^= u64::from(sender.state.read_flow(receiver, message.kind));
-            read ^= queue.read_ahead(&message.entry);
-        }
-        std::hint::black_box(read);
-        for message in outbox.take() {
+        for message in outbox.take(messages) {
             let receiver = topology.declared[message.declared as usize];
             let sender = &mut self.actors[message.sender as usize];
             let ordinal = sender.state.next_in_flow(receiver, message.kind);
             store.complete(message.entry.slot, receiver, ordinal);
             queue.push(message.entry);
         }
+        outbox.taken();
     }
 
     /// The way of nearly all events: a message or a timer for an actor that is there, of which

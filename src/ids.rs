@@ -35,6 +35,7 @@ impl HostId {
     }
 
     /// The host's number in order of declaration, from 0.
+    #[inline]
     pub fn index(self) -> usize {
         self.index as usize
     }
@@ -91,6 +92,7 @@ impl EntityId {
     pub const CONTROL: EntityId = EntityId(0);
 
     /// The entity's place in name order.
+    #[inline]
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -135,11 +137,13 @@ impl MatchKey {
     }
 
     /// Both as one number, cycle first.
+    #[inline]
     pub const fn bits(self) -> u64 {
         self.0
     }
 
     /// The key with these [`MatchKey::bits`].
+    #[inline]
     pub const fn from_bits(bits: u64) -> Self {
         MatchKey(bits)
     }

@@ -27,6 +27,7 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
+    #[inline(always)]
     pub(crate) fn new(key: EventKey, slot: u32) -> Self {
         let rest = u64::from(key.step) << 32 | u64::from(key.tie);
         Entry {
@@ -124,9 +125,12 @@ const NEAR: usize = 48;
 /// So many are sorted at most: a bucket of later events is taken whole.
 const SORTED: usize = 512;
 
-/// For so many events at a time is read ahead: what they need fits into the first cache, and a
-/// processor does not wait for more at once.
-const AHEAD: usize = 16;
+/// For so many events at a time is fetched what they need: as many as a processor waits for at once.
+pub(crate) const BATCH: usize = 16;
+
+/// So many batches of the earliest events are known, if there are so many events: one for each thing
+/// that is fetched, and one that is handled.
+const KNOWN: usize = 3 * BATCH;
 
 /// A heap of more than this is spread over buckets. A smaller one lies in the first cache.
 const HEAP: usize = 96;
@@ -141,8 +145,6 @@ pub(crate) struct Queue {
     far: Far,
     /// The size at which the heap is spread.
     spread_at: usize,
-    /// So many of the later events in `near` came from a bucket, and nobody has read ahead for them.
-    unread: usize,
     /// The rest of the present step, in key order.
     present: VecDeque<Entry>,
     /// The next step of the present instant, in order of arrival.
@@ -158,7 +160,6 @@ impl Default for Queue {
             heap: QuaternaryHeap::default(),
             far: Far::default(),
             spread_at: HEAP,
-            unread: 0,
             present: VecDeque::new(),
             next: Vec::new(),
             now: None,
@@ -176,10 +177,10 @@ impl Queue {
         }
     }
 
-    /// Reads where an entry will be put, if that is far ahead.
+    /// Fetches where an entry will be put, if that is far ahead.
     #[inline(always)]
-    pub(crate) fn read_ahead(&self, entry: &Entry) -> u64 {
-        self.far.read_ahead(entry)
+    pub(crate) fn fetch(&self, entry: &Entry) {
+        self.far.fetch(entry);
     }
 
     #[inline(always)]
@@ -275,31 +276,35 @@ impl Queue {
         self.near.last()
     }
 
+    /// Adds the next of the later events to `near`.
+    #[inline(never)]
     fn refill(&mut self) {
+        let known = self.near.len();
         if !self.heap.is_empty() {
             // From the heap they come in order: the earliest first, which belongs at the end.
             self.near
                 .extend((0..NEAR / 2).map_while(|_| self.heap.pop()));
-            self.near.reverse();
+            self.near[known..].reverse();
         } else if !self.far.is_empty() {
             self.far.take_next(&mut self.near);
-            self.unread = self.near.len();
             // Greatest entry first is least key first, which belongs at the end.
-            self.near.sort_unstable();
+            self.near[known..].sort_unstable();
+        }
+        // What was known comes earlier.
+        self.near.rotate_left(known);
+    }
+
+    /// Sees to it that [`Queue::batch`] knows some events, if there are any.
+    pub(crate) fn look_ahead(&mut self) {
+        while self.near.len() < KNOWN && !(self.heap.is_empty() && self.far.is_empty()) {
+            self.refill();
         }
     }
 
-    /// True if the next events lay far ahead a while ago, and were not yet asked for.
-    #[inline(always)]
-    pub(crate) fn has_unread(&self) -> bool {
-        self.near.len() <= self.unread && self.unread > 0
-    }
-
-    /// The next few of those, the last first.
-    pub(crate) fn unread(&mut self) -> &[Entry] {
-        let known = self.near.len();
-        self.unread = known.saturating_sub(AHEAD);
-        &self.near[self.unread..]
+    /// Of the next events of later instants the batch of this number, the last first.
+    pub(crate) fn batch(&self, number: usize) -> &[Entry] {
+        let end = self.near.len().saturating_sub(number * BATCH);
+        &self.near[end.saturating_sub(BATCH)..end]
     }
 
     /// Time and step of the next event.

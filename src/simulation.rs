@@ -9,7 +9,6 @@ use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::actor::boxed::Boxed;
 use crate::actor::{Accepts, Actor, Address, Recipient};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
 use crate::charge::ChargeJournal;
@@ -199,7 +198,7 @@ impl Simulation {
             name: name.to_owned(),
             host,
             actor_type,
-            factory: Box::new(move |name| Boxed::boxed(build(name))),
+            factory: Box::new(move |name| Box::new(build(name))),
         });
         Address::new(self.owner, declared)
     }

@@ -40,6 +40,7 @@ impl SimTime {
     pub const MAX: SimTime = SimTime(u64::MAX);
 
     /// The instant `nanos` nanoseconds after the start.
+    #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
         SimTime(nanos)
     }
@@ -50,6 +51,7 @@ impl SimTime {
     }
 
     /// Nanoseconds since the start.
+    #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
@@ -78,6 +80,7 @@ impl SimDuration {
     pub const MAX: SimDuration = SimDuration(u64::MAX);
 
     /// `nanos` nanoseconds.
+    #[inline]
     pub const fn from_nanos(nanos: u64) -> Self {
         SimDuration(nanos)
     }
@@ -105,6 +108,7 @@ impl SimDuration {
     }
 
     /// The length in nanoseconds.
+    #[inline]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
@@ -120,6 +124,7 @@ impl SimDuration {
     }
 
     /// True for a length of zero.
+    #[inline]
     pub const fn is_zero(self) -> bool {
         self.0 == 0
     }

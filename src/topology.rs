@@ -407,6 +407,7 @@ impl Topology {
         self.info.name(entity)
     }
 
+    #[inline(always)]
     pub(crate) fn name_hash(&self, entity: EntityId) -> u64 {
         self.name_hashes[entity.index()]
     }
@@ -415,10 +416,12 @@ impl Topology {
         &self.host_names[self.places[entity.index()].host as usize]
     }
 
+    #[inline(always)]
     pub(crate) fn place(&self, entity: EntityId) -> Location {
         self.places[entity.index()]
     }
 
+    #[inline(always)]
     pub(crate) fn kind(&self, index: KindIndex) -> &Arc<Kind> {
         &self.info.kinds[index as usize]
     }

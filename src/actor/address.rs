@@ -4,7 +4,6 @@ use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;
 
-use super::boxed::Boxed;
 use super::context::Context;
 use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
@@ -134,28 +133,34 @@ pub trait Target<M>: Copy {
 }
 
 impl<A: Handler<M>, M: Message> Target<M> for Address<A> {
+    #[inline]
     fn owner(&self) -> Owner {
         self.owner
     }
 
+    #[inline]
     fn declared(&self) -> u32 {
         self.declared
     }
 
+    #[inline]
     fn seal(&self, message: M) -> Sealed {
         seal::<A, M>(message)
     }
 }
 
 impl<M: Message> Target<M> for Recipient<M> {
+    #[inline]
     fn owner(&self) -> Owner {
         self.owner
     }
 
+    #[inline]
     fn declared(&self) -> u32 {
         self.declared
     }
 
+    #[inline]
     fn seal(&self, message: M) -> Sealed {
         (self.seal)(message)
     }
@@ -218,11 +223,11 @@ impl<A: Handler<M>, M: Message> Encode for Addressed<A, M> {
 
 impl<A: Handler<M>, M: Message> Letter for Addressed<A, M> {
     fn deliver(&mut self, actor: &mut dyn AnyActor, core: &mut Core<'_>) -> Outcome {
-        let boxed = (actor as &mut dyn Any)
-            .downcast_mut::<Boxed<A>>()
+        let actor = (actor as &mut dyn Any)
+            .downcast_mut::<A>()
             .expect("addresses are typed by their actor");
         let message = self.message.take().expect("a letter is delivered once");
-        boxed.actor.handle(message, &mut Context::new(core))
+        actor.handle(message, &mut Context::new(core))
     }
 
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {

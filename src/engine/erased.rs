@@ -34,10 +34,8 @@ pub(crate) trait Letter: Encode + Send {
 /// An actor whose type the engine does not know.
 pub(crate) trait AnyActor: Any + Send {
     fn started(&mut self, core: &mut Core<'_>) -> Outcome;
-    /// Reads a part of the actor; see [`Engine::read_ahead`].
-    ///
-    /// [`Engine::read_ahead`]: super::Engine::read_ahead
-    fn read_ahead(&self) -> u64;
+    /// Fetches the actor, as far as a line of cache goes.
+    fn fetch(&self);
 }
 
 /// The constructor of an actor, called with its name at the start and at each restart.

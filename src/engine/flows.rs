@@ -5,6 +5,8 @@
 //! Computer Programming" vol. 3, section 6.4): one line of cache holds eight, and nearly always the
 //! first place looked at is the flow's. The few flows that do not fit into eight bytes are elsewhere.
 
+use prefetch_index::prefetch_index;
+
 use crate::ids::{EntityId, KindIndex};
 use crate::topology::FixedMap;
 
@@ -63,13 +65,11 @@ impl Flows {
         }
     }
 
-    /// Reads where a flow probably is; see [`Engine::queue_sent`].
-    ///
-    /// [`Engine::queue_sent`]: super::Engine::queue_sent
+    /// Fetches where a flow probably is.
     #[inline(always)]
-    pub(crate) fn read_ahead(&self, receiver: EntityId, kind: KindIndex) -> u32 {
+    pub(crate) fn fetch(&self, receiver: EntityId, kind: KindIndex) {
         let at = first_place(short_flow(receiver.0, kind), self.places.len());
-        self.places.get(at).map_or(0, |place| place.count)
+        prefetch_index(&self.places, at);
     }
 
     #[inline(always)]

@@ -10,7 +10,7 @@ use crate::key::Bound;
 use crate::queue::Entry;
 use crate::time::SimTime;
 
-/// So many are queued at once: as many reads as a processor waits for together.
+/// What so many need is fetched at once: as many as a processor waits for together.
 const AT_ONCE: usize = 16;
 
 /// A message without its number, whose head says who sent it and nothing of its receiver.
@@ -26,6 +26,8 @@ pub(crate) struct Unqueued {
 /// Messages that are not queued yet, in the order in which they were sent.
 pub(crate) struct Outbox {
     messages: Vec<Unqueued>,
+    /// What so many of the first need was fetched.
+    fetched: usize,
     /// The least time at which one of them is delivered.
     least: SimTime,
 }
@@ -34,6 +36,7 @@ impl Default for Outbox {
     fn default() -> Self {
         Outbox {
             messages: Vec::new(),
+            fetched: 0,
             least: SimTime::MAX,
         }
     }
@@ -46,14 +49,18 @@ impl Outbox {
         self.messages.push(message);
     }
 
+    pub(crate) fn len(&self) -> usize {
+        self.messages.len()
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.messages.is_empty()
     }
 
-    /// True once there are as many as are queued at once.
+    /// True once there are as many as are fetched for at once.
     #[inline(always)]
     pub(crate) fn is_full(&self) -> bool {
-        self.messages.len() >= AT_ONCE
+        self.messages.len() >= self.fetched + AT_ONCE
     }
 
     /// Until when the queue alone knows what comes next, and at most this.
@@ -62,14 +69,31 @@ impl Outbox {
         bound.min(Bound::at(self.least))
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &Unqueued> {
-        self.messages.iter()
+    /// For how many of the first messages was fetched.
+    pub(crate) fn fetched(&self) -> usize {
+        self.fetched
     }
 
-    /// Takes all of them, to be queued.
-    pub(crate) fn take(&mut self) -> impl Iterator<Item = Unqueued> {
-        self.least = SimTime::MAX;
-        self.messages.drain(..)
+    /// Those for which nothing was fetched.
+    pub(crate) fn unfetched(&self) -> &[Unqueued] {
+        &self.messages[self.fetched..]
+    }
+
+    /// For all messages was fetched what they need.
+    pub(crate) fn all_fetched(&mut self) {
+        self.fetched = self.messages.len();
+    }
+
+    /// Takes so many of the first, to be queued.
+    pub(crate) fn take(&mut self, first: usize) -> impl Iterator<Item = Unqueued> {
+        self.messages.drain(..first)
+    }
+
+    /// Some of the first were taken, and all for which was fetched.
+    pub(crate) fn taken(&mut self) {
+        self.fetched = 0;
+        let times = self.messages.iter().map(|message| message.entry.time());
+        self.least = times.min().unwrap_or(SimTime::MAX);
     }
 }
 

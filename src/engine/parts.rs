@@ -320,8 +320,9 @@ impl Parts {
             head = head.keyed(match_key, state.repeats(receiver, kind, match_key));
         }
         let slot = self.store.insert(head, Some(letter));
+        let entry = Entry::new(key, slot);
         self.outbox.push(Unqueued {
-            entry: Entry::new(key, slot),
+            entry,
             sender: self.topology.place(me).local,
             declared,
             kind,

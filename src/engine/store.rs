@@ -1,5 +1,9 @@
 //! Where events wait, by slot. Slots are reused, last freed first, while they are still in the cache.
 
+use std::slice::from_ref;
+
+use prefetch_index::prefetch_index;
+
 use super::{Class, Head, Sealed, Side};
 use crate::ids::EntityId;
 
@@ -94,10 +98,12 @@ impl Store {
         self.waiting[slot as usize].head.receiver
     }
 
-    /// Whether the event in this slot has a letter, which lies in the other of its two lines.
+    /// Fetches the event in this slot, both of its lines.
     #[inline(always)]
-    pub(crate) fn has_letter(&self, slot: u32) -> bool {
-        self.waiting[slot as usize].letter.is_some()
+    pub(crate) fn fetch(&self, slot: u32) {
+        let waiting = &self.waiting[slot as usize];
+        prefetch_index(from_ref(&waiting.head), 0);
+        prefetch_index(from_ref(&waiting.letter), 0);
     }
 
     /// True if what waits does not fit into a processor's nearest caches.

@@ -5,6 +5,8 @@
 //! which the caller has. An event is moved a few times, however many wait, and each move writes to
 //! the end of a list, where a heap reads and writes half a dozen distant lines of cache.
 
+use prefetch_index::prefetch_index;
+
 use super::Entry;
 use crate::time::SimTime;
 
@@ -145,16 +147,16 @@ impl Far {
         unreachable!("what comes before `beyond` lies in the coarsest rung");
     }
 
-    /// Reads the end of the bucket that [`Far::push`] would put an entry in. Those of the coarsest rung
-    /// lie far apart; the others' are few.
+    /// Fetches the end of the bucket that [`Far::push`] would put an entry in. Those of the coarsest
+    /// rung lie far apart; the others' are few.
     #[inline(always)]
-    pub(super) fn read_ahead(&self, entry: &Entry) -> u64 {
+    pub(super) fn fetch(&self, entry: &Entry) {
         let time_ns = entry.time.as_nanos();
         let coarsest = self.rungs.first();
         let rung = coarsest.filter(|rung| (rung.start_ns..self.beyond_ns).contains(&time_ns));
-        let bucket = rung.and_then(|rung| rung.buckets.get(rung.bucket_of(entry.time)));
-        let last = bucket.and_then(|bucket| bucket.last());
-        last.map_or(0, |last| last.count)
+        if let Some(bucket) = rung.and_then(|rung| rung.buckets.get(rung.bucket_of(entry.time))) {
+            prefetch_index(bucket, bucket.len());
+        }
     }
 
     /// Appends the events of the next bucket that has any to `out`, in no order.
