@@ -203,16 +203,10 @@ impl Engine {
     /// which this was done before.
     #[inline(never)]
     fn queue_fetched(&mut self) {
-        let Parts {
-            topology,
-            queue,
-            outbox,
-            ..
-        } = &mut self.parts;
+        let Parts { queue, outbox, .. } = &mut self.parts;
         for message in outbox.unfetched() {
-            let receiver = topology.declared[message.declared as usize];
             let sender = &self.actors[message.sender as usize];
-            sender.state.fetch_flow(receiver, message.kind);
+            sender.state.fetch_flow(message.declared, message.kind);
             queue.fetch(&message.entry);
         }
         let fetched = self.parts.outbox.fetched();
@@ -231,7 +225,7 @@ impl Engine {
         for message in outbox.take(messages) {
             let receiver = topology.declared[message.declared as usize];
             let sender = &mut self.actors[message.sender as usize];
-            let ordinal = sender.state.next_in_flow(receiver, message.kind);
+            let ordinal = sender.state.next_in_flow(message.declared, message.kind);
             store.complete(message.entry.slot, receiver, ordinal);
             queue.push(message.entry);
         }
@@ -566,7 +560,7 @@ impl Engine {
         let local = self.parts.topology.place(head.receiver).local as usize;
         let state = &mut self.actors[local].state;
         // The flow from `@control`, to which no actor sends anything.
-        let ordinal = state.next_in_flow(EntityId::CONTROL, kind);
+        let ordinal = state.next_of_entity(EntityId::CONTROL, kind);
         let mut head = head.of_kind(Some(kind));
         head.ordinal = ordinal;
         self.parts.begin(key);

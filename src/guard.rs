@@ -13,7 +13,10 @@ use crate::fault::FaultCause;
 /// Runs code of a user; a panic becomes a cause.
 #[inline(always)]
 pub(crate) fn guarded<T>(code: impl FnOnce() -> T) -> Result<T, Box<FaultCause>> {
-    catch_unwind(AssertUnwindSafe(code)).map_err(|payload| panicked(payload, FaultCause::Panic))
+    match catch_unwind(AssertUnwindSafe(code)) {
+        Ok(value) => Ok(value),
+        Err(payload) => Err(panicked(payload, FaultCause::Panic)),
+    }
 }
 
 /// Drops something of a user; a panic becomes a cause.

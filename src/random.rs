@@ -7,7 +7,7 @@
 
 mod ziggurat;
 
-use rand_core::{Rng, SeedableRng};
+use rand_core::Rng;
 use rand_pcg::Pcg64;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_128};
 
@@ -78,11 +78,9 @@ impl RandomKey {
     #[inline]
     pub fn stream(&self) -> Stream {
         let hash = self.hash();
-        let mut seed = [0u8; 32];
-        seed[..16].copy_from_slice(&hash.to_le_bytes());
-        // The other half selects the PCG stream; any fixed mix of the hash will do.
-        seed[16..].copy_from_slice(&hash.rotate_left(64).wrapping_mul(0x9E37_79B9).to_le_bytes());
-        Stream(Pcg64::from_seed(seed))
+        // Which of the generator's streams it is; any fixed mix of the hash will do.
+        let mix = hash.rotate_left(64).wrapping_mul(0x9E37_79B9);
+        Stream(Pcg64::new(hash, mix >> 1))
     }
 
     /// One uniform draw from [0, 1) at this address, without building a stream: what a link that

@@ -60,16 +60,21 @@ impl CellState {
         }
     }
 
-    /// The ordinal of the next message in a flow.
+    /// The ordinal of the next message of this kind to the actor with this number in its address.
     #[inline(always)]
-    pub(crate) fn next_in_flow(&mut self, receiver: EntityId, kind: KindIndex) -> u64 {
-        self.flows.next(receiver, kind)
+    pub(crate) fn next_in_flow(&mut self, declared: u32, kind: KindIndex) -> u64 {
+        self.flows.next(declared, kind)
     }
 
     /// Fetches what [`CellState::next_in_flow`] will need.
     #[inline(always)]
-    pub(crate) fn fetch_flow(&self, receiver: EntityId, kind: KindIndex) {
-        self.flows.fetch(receiver, kind);
+    pub(crate) fn fetch_flow(&self, declared: u32, kind: KindIndex) {
+        self.flows.fetch(declared, kind);
+    }
+
+    /// The ordinal of the next change of a link, or of what the simulation tells.
+    pub(crate) fn next_of_entity(&mut self, entity: EntityId, kind: KindIndex) -> u64 {
+        self.flows.next_of_entity(entity, kind)
     }
 
     /// The ordinal of the next timer of this kind.

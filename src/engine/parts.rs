@@ -269,7 +269,7 @@ impl Parts {
             delay,
         } = outbound;
         let receiver = self.topology.declared[declared as usize];
-        let ordinal = state.next_in_flow(receiver, kind);
+        let ordinal = state.next_in_flow(declared, kind);
         let repeat = match_key.map_or(0, |key| state.repeats(receiver, kind, key));
         // Called on each way by itself: what one way puts in memory the other keeps in registers.
         let head = |parts: &Parts| {

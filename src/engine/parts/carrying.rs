@@ -216,7 +216,7 @@ impl Parts {
             });
         }
         let kind = self.topology.links.get(link).map(|link| link.change_kind);
-        let ordinal = state.next_in_flow(link, kind.unwrap_or(KindIndex::MAX));
+        let ordinal = state.next_of_entity(link, kind.unwrap_or(KindIndex::MAX));
         let mut head = Head::of_entity(Class::Tell, me);
         head.receiver = link;
         let head = head.caused(self.key, KindIndex::MAX, ordinal).of_kind(kind);
