@@ -102,7 +102,7 @@ impl Store {
     #[inline(always)]
     pub(crate) fn fetch(&self, slot: u32) {
         let waiting = &self.waiting[slot as usize];
-        prefetch_index(from_ref(&waiting.head), 0);
+        prefetch_index(from_ref(&waiting.head.receiver), 0);
         prefetch_index(from_ref(&waiting.letter), 0);
     }
 
@@ -160,11 +160,20 @@ impl Store {
 
 #[cfg(test)]
 mod tests {
+    use std::mem::offset_of;
+
     use super::*;
 
     /// Every event is written and read once; each further line of cache costs as much again.
     #[test]
-    fn an_event_waits_in_two_lines_of_cache() {
+    fn an_event_waits_in_two_lines_of_cache_and_both_are_fetched() {
         assert_eq!(size_of::<Waiting>(), 128);
+        let fetched = [
+            offset_of!(Waiting, letter),
+            offset_of!(Waiting, head.receiver),
+        ];
+        let mut lines = fetched.map(|offset| offset / 64);
+        lines.sort_unstable();
+        assert_eq!(lines, [0, 1], "{fetched:?}");
     }
 }
