@@ -117,11 +117,15 @@ impl Seats {
     }
 }
 
+/// So long is waited awake for the engines that others run.
+const AWAKE: Duration = Duration::from_micros(50);
+
 /// The engines that have something to do in one part of a window. Whoever has time claims the next one.
 pub(super) struct Round {
     seats: Seats,
     pub(super) due: Vec<usize>,
     claimed: AtomicUsize,
+    done: AtomicUsize,
     bound: Bound,
 }
 
@@ -131,6 +135,7 @@ impl Round {
             seats,
             due,
             claimed: AtomicUsize::new(0),
+            done: AtomicUsize::new(0),
             bound,
         }
     }
@@ -139,6 +144,17 @@ impl Round {
     pub(super) fn share(&self) {
         while let Some(at) = self.due.get(self.claimed.fetch_add(1, Ordering::Relaxed)) {
             self.seats.take(*at).run(self.bound);
+            self.done.fetch_add(1, Ordering::Release);
+        }
+    }
+
+    /// Waits until all engines have run, awake, and no longer than it takes to fall asleep and be
+    /// woken.
+    #[expect(clippy::disallowed_types)]
+    pub(super) fn wait_awake(&self) {
+        let begin = Instant::now();
+        while self.done.load(Ordering::Acquire) < self.due.len() && begin.elapsed() < AWAKE {
+            std::hint::spin_loop();
         }
     }
 }

@@ -186,6 +186,11 @@ impl Coordinator {
                 let answer = helper.ask(Share(round.clone())).enqueue().await;
                 asked.push(answer.unwrap_or_else(|error| lost_worker(&error)));
             }
+            // So the last shares the work here, and nothing else is left to do on this thread.
+            if let Some(last) = asked.pop() {
+                last.await.unwrap_or_else(|error| lost_worker(&error));
+            }
+            round.wait_awake();
             for answer in asked {
                 answer.await.unwrap_or_else(|error| lost_worker(&error));
             }
