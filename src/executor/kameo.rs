@@ -15,6 +15,7 @@ use std::sync::Arc;
 use kameo::Actor;
 use kameo::actor::{ActorRef, Spawn};
 use kameo::message::{Context, Message};
+use kameo::reply::DelegatedReply;
 use tokio::runtime::Runtime;
 
 use self::seat::Round;
@@ -127,12 +128,24 @@ impl Actor for Helper {
 }
 
 /// Asks for help with a window.
-struct Share(Arc<Round>);
+struct Share {
+    round: Arc<Round>,
+    /// Whether to wait awake for the next one, on a thread that has nothing else to do.
+    stays_awake: bool,
+}
 
 impl Message<Share> for Helper {
-    type Reply = ();
+    type Reply = DelegatedReply<()>;
 
-    async fn handle(&mut self, share: Share, _: &mut Context<Self, Self::Reply>) {
-        share.0.share();
+    async fn handle(&mut self, share: Share, ctx: &mut Context<Self, Self::Reply>) -> Self::Reply {
+        share.round.share();
+        let (replied, sender) = ctx.reply_sender();
+        if let Some(sender) = sender {
+            sender.send(());
+        }
+        if share.stays_awake {
+            share.round.await_next();
+        }
+        replied
     }
 }

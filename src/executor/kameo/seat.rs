@@ -117,8 +117,15 @@ impl Seats {
     }
 }
 
-/// So long is waited awake for the engines that others run.
-const AWAKE: Duration = Duration::from_micros(50);
+/// Waits awake, but not long: to fall asleep and be woken takes about as long as a light handler.
+#[expect(clippy::disallowed_types)]
+fn wait_awake(is_over: impl Fn() -> bool) {
+    const AWAKE: Duration = Duration::from_micros(50);
+    let begin = Instant::now();
+    while !is_over() && begin.elapsed() < AWAKE {
+        std::hint::spin_loop();
+    }
+}
 
 /// The engines that have something to do in one part of a window. Whoever has time claims the next one.
 pub(super) struct Round {
@@ -127,11 +134,22 @@ pub(super) struct Round {
     claimed: AtomicUsize,
     done: AtomicUsize,
     bound: Bound,
+    /// How many rounds were shared among threads, this one with them.
+    number: usize,
+    /// The same, as it is now.
+    newest: Arc<AtomicUsize>,
 }
 
 impl Round {
-    pub(super) fn new(seats: Seats, due: Vec<usize>, bound: Bound) -> Self {
+    pub(super) fn new(
+        seats: Seats,
+        due: Vec<usize>,
+        bound: Bound,
+        newest: Arc<AtomicUsize>,
+    ) -> Self {
         Round {
+            number: newest.load(Ordering::Relaxed),
+            newest,
             seats,
             due,
             claimed: AtomicUsize::new(0),
@@ -148,13 +166,13 @@ impl Round {
         }
     }
 
-    /// Waits until all engines have run, awake, and no longer than it takes to fall asleep and be
-    /// woken.
-    #[expect(clippy::disallowed_types)]
-    pub(super) fn wait_awake(&self) {
-        let begin = Instant::now();
-        while self.done.load(Ordering::Acquire) < self.due.len() && begin.elapsed() < AWAKE {
-            std::hint::spin_loop();
-        }
+    /// Waits until all engines have run.
+    pub(super) fn await_others(&self) {
+        wait_awake(|| self.done.load(Ordering::Acquire) >= self.due.len());
+    }
+
+    /// Waits until the next round is shared.
+    pub(super) fn await_next(&self) {
+        wait_awake(|| self.newest.load(Ordering::Relaxed) != self.number);
     }
 }

@@ -7,6 +7,7 @@
 mod settle;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use kameo::actor::{ActorRef, Spawn};
@@ -44,6 +45,8 @@ pub(super) struct Coordinator {
     committer: Committer,
     look_ahead: SimDuration,
     sample_names: SampleNames,
+    /// How many rounds were shared among threads.
+    rounds: Arc<AtomicUsize>,
     /// Reused from window to window: which record of which engine comes next.
     order: Vec<(EventKey, usize, usize)>,
 }
@@ -73,6 +76,7 @@ impl Coordinator {
             committer,
             look_ahead,
             sample_names: SampleNames::default(),
+            rounds: Arc::default(),
             order: Vec::new(),
         }
     }
@@ -177,20 +181,29 @@ impl Coordinator {
             return;
         }
         let threads = self.threads_worth_waking(&due);
-        let round = Arc::new(Round::new(self.seats.clone(), due, bound));
+        if threads > 1 {
+            self.rounds.fetch_add(1, Ordering::Relaxed);
+        }
+        let rounds = self.rounds.clone();
+        let round = Arc::new(Round::new(self.seats.clone(), due, bound, rounds));
         if threads > 1 {
             // The leader takes no share itself: tokio starts the last actor that it asks on its own
             // thread, and only once it waits.
             let mut asked = Vec::with_capacity(self.helpers.len());
-            for helper in self.helpers.iter().take(threads) {
-                let answer = helper.ask(Share(round.clone())).enqueue().await;
+            for (at, helper) in self.helpers.iter().take(threads).enumerate() {
+                // The last is started on this thread.
+                let stays_awake = at + 1 < threads;
+                let share = Share {
+                    round: round.clone(),
+                    stays_awake,
+                };
+                let answer = helper.ask(share).enqueue().await;
                 asked.push(answer.unwrap_or_else(|error| lost_worker(&error)));
             }
-            // So the last shares the work here, and nothing else is left to do on this thread.
             if let Some(last) = asked.pop() {
                 last.await.unwrap_or_else(|error| lost_worker(&error));
             }
-            round.wait_awake();
+            round.await_others();
             for answer in asked {
                 answer.await.unwrap_or_else(|error| lost_worker(&error));
             }
