@@ -2,8 +2,8 @@
 //!
 //! Where everyone talks to everyone, the number of a flow lies anywhere in many megabytes, and so does
 //! the end of the bucket in which a message waits: each takes as long to reach as the rest of an event
-//! takes. Neither is asked for before the message is delivered. So both are looked up for many messages
-//! at once: no look-up depends on the one before, and a processor waits for all of them together.
+//! takes. Neither is asked for before the message is delivered. So both are fetched for many messages
+//! at once, and looked up when as many more have been sent: then they are there.
 
 use crate::ids::KindIndex;
 use crate::key::Bound;

@@ -44,27 +44,27 @@ const SIZES: [Size; 5] = [
     Size {
         actors: 16,
         population: 1,
-        events: 400_000,
+        events: 1_200_000,
     },
     Size {
         actors: 128,
         population: 4,
-        events: 300_000,
+        events: 1_200_000,
     },
     Size {
         actors: 1024,
         population: 16,
-        events: 200_000,
+        events: 800_000,
     },
     Size {
         actors: 10_000,
         population: 4,
-        events: 200_000,
+        events: 800_000,
     },
     Size {
         actors: 100_000,
         population: 4,
-        events: 400_000,
+        events: 1_200_000,
     },
 ];
 
@@ -74,8 +74,9 @@ const NAMES: [&str; 6] = ["NeXosim", "SimPy", "ns-3", "inline", "digest", "kameo
 /// NeXosim joins each actor with each other by a port, and kameo has a host for each actor: with
 /// more actors than this neither fits the time and the memory of this run.
 const MOST_JOINED: u32 = 2_000;
-/// SimPy handles so many times fewer events than the others.
-const SIMPY_SHARE: u64 = 10;
+/// SimPy and NeXosim handle so many times fewer events than the others, which take less time for one.
+const SIMPY_SHARE: u64 = 40;
+const NEXOSIM_SHARE: u64 = 8;
 
 /// How long an event takes [ns], without the assembly: two runs, one four times as long as the
 /// other, and what lies between them.
@@ -118,7 +119,10 @@ fn round(size: Size, ns_3: Option<&Program>, simpy: Option<&Program>) -> [Option
     let joined = size.actors <= MOST_JOINED;
     let events = 4 * size.events;
     [
-        joined.then(|| event_ns(size, nexosim_hold::run)),
+        joined.then(|| {
+            let events = size.events / NEXOSIM_SHARE;
+            event_ns(Size { events, ..size }, nexosim_hold::run)
+        }),
         simpy.and_then(|simpy| {
             simpy.event_ns(Size {
                 events: events / SIMPY_SHARE,
