@@ -218,8 +218,7 @@ impl Flows {
 
     /// Makes the places anew, for all short flows and more.
     fn rebuild(&mut self) {
-        let mut all = Vec::new();
-        self.take_short(&mut all);
+        let all = self.take_short();
         let (layout, places) = match listed(&all) {
             Some((first, flows)) => (Layout::List { first }, flows.div_ceil(2) as usize),
             None => (Layout::Table { taken: 0 }, grown(all.len())),
@@ -231,27 +230,22 @@ impl Flows {
     }
 
     /// Takes all short flows.
-    fn take_short(&mut self, all: &mut Vec<Short>) {
-        let places = std::mem::take(&mut self.places).into_iter();
-        match self.layout {
-            Layout::Table { .. } => all.extend(places),
-            Layout::List { first } => all.extend((first..).step_by(2).zip(places).flat_map(
-                |(
-                    flow,
-                    Short {
-                        flow: one,
-                        count: next,
-                    },
-                )| {
-                    let short = |flow, count| Short { flow, count };
-                    [short(flow, one), short(flow + 1, next)]
-                },
-            )),
-        }
+    fn take_short(&mut self) -> Vec<Short> {
+        let places = std::mem::take(&mut self.places).into_vec();
+        let mut all = match self.layout {
+            Layout::Table { .. } => places,
+            Layout::List { first } => {
+                let counts = places.iter().flat_map(|pair| [pair.flow, pair.count]);
+                let flows = (0..).map(|at| first.wrapping_add(at));
+                let short = |(flow, count)| Short { flow, count };
+                flows.zip(counts).map(short).collect()
+            }
+        };
         all.retain(|flow| flow.count > 0);
         if let Some(rest) = &mut self.rest {
-            std::mem::take(&mut rest.unlisted).take_short(all);
+            all.append(&mut std::mem::take(&mut rest.unlisted).take_short());
         }
+        all
     }
 
     /// Goes on with a flow that is not short, or starts with its message number `first`.
@@ -337,6 +331,7 @@ mod tests {
     fn crowd(size: u32) -> impl Strategy<Value = Receiver> {
         prop_oneof![
             20 => (700..700 + size).prop_map(Receiver::Actor),
+            10 => (SHORT_RECEIVERS - size..=SHORT_RECEIVERS).prop_map(Receiver::Actor),
             1 => (0_u32..5000).prop_map(Receiver::Actor),
             1 => receiver(),
         ]
