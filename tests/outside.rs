@@ -1,34 +1,25 @@
 //! A system that is no part of this workspace: `tests/outside` is a crate of somebody else's, with
-//! settings, metrics, a scenario, a study, a picture and a scene of its own. It is built as users
-//! build theirs, and every command speaks of it, and of no system that is built in here.
+//! settings, metrics, a scenario, a study, a picture and a scene of its own. Every command speaks of
+//! it, and of no system that is built in here.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::LazyLock;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The binary, built once. It takes the versions that the workspace takes, so that it needs no
-/// network, and goes to the same folder, so that what is built already is not built again.
-static BINARY: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = root().join("tests/outside");
-    std::fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).expect("it can be copied");
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("..");
-    let build = Command::new(env!("CARGO"))
-        .args(["build", "--offline", "--quiet", "--target-dir"])
-        .arg(&target)
-        .current_dir(folder)
-        .output()
-        .expect("cargo starts");
-    let text = String::from_utf8_lossy(&build.stderr);
-    assert!(build.status.success(), "it does not build:\n{text}");
-    target.join("debug/beacons")
-});
+/// Its binary, beside that of this test: `cargo test` builds it as an example of this package, of
+/// what it has compiled already.
+fn binary() -> PathBuf {
+    let test = std::env::current_exe().expect("this program has a path");
+    let profile = test.ancestors().nth(2).expect("it lies in deps");
+    profile.join("examples/beacons")
+}
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let command = Command::new(&*BINARY)
+    let command = Command::new(binary())
         .args(arguments)
         .current_dir(folder)
         .output();
@@ -140,4 +131,43 @@ fn its_mistakes_are_told_with_their_place() {
     assert_eq!(output.status.code(), Some(2));
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(text.contains("built in: beacons/quiet"), "{text}");
+}
+
+/// Its manifest is not what it is built from here: it names the crates that the source names, with
+/// the features that the workspace has of them, and cargo finds all of them.
+#[test]
+fn its_manifest_has_what_it_needs() {
+    let folder = root().join("tests/outside");
+    let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = manifest.parse().unwrap();
+    let listed = manifest["dependencies"].as_table().unwrap();
+    let listed: BTreeSet<_> = listed.keys().map(|name| name.replace('-', "_")).collect();
+    let ours = std::fs::read_to_string(root().join("tests/Cargo.toml")).unwrap();
+    let ours: toml::Table = ours.parse().unwrap();
+    let tables = ["dependencies", "dev-dependencies"].map(|table| ours[table].as_table().unwrap());
+    let known = tables.into_iter().flatten();
+    let known: BTreeSet<_> = known.map(|(name, _)| name.replace('-', "_")).collect();
+    assert!(
+        listed.is_subset(&known),
+        "{listed:?}, and this package has {known:?}"
+    );
+    let source = std::fs::read_to_string(folder.join("src/main.rs")).unwrap();
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let named = |name: &str| {
+        let path = format!("{name}::");
+        let mut found = source.match_indices(&path);
+        found.any(|(at, _)| !source[..at].ends_with(|c| is_word(c) || c == ':'))
+    };
+    for name in known.difference(&listed) {
+        assert!(!named(name), "{name} is not in the manifest");
+    }
+    // The versions that the workspace takes, so that no network is needed.
+    std::fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    let tree = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--quiet"])
+        .current_dir(&folder)
+        .output()
+        .expect("cargo starts");
+    let text = String::from_utf8_lossy(&tree.stderr);
+    assert!(tree.status.success(), "{text}");
 }

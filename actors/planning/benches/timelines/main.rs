@@ -59,7 +59,7 @@ fn main() {
     let earlier = read_earlier();
     let commit = earlier.first().map_or("none", |row| row.commit.as_str());
     println!(
-        "{:<34} {:>12} {:>10}   earlier ({commit})",
+        "{:<34} {:>12} {:>10}   earlier ({commit}), and of that",
         "", "a second", "operations"
     );
     for row in &rows {
@@ -67,7 +67,12 @@ fn main() {
         let each = row.operations as f64 / row.count as f64;
         print!("{:<34} {per_second:>12.0} {each:>10.1}", row.name);
         match earlier.iter().find(|at| at.name == row.name) {
-            Some(at) => println!("   {:>12.0} {:>10.1}", at.per_second, at.operations_each),
+            Some(at) => println!(
+                "   {:>12.0} {:>10.1} {:>6.2}",
+                at.per_second,
+                at.operations_each,
+                per_second / at.per_second
+            ),
             None => println!(),
         }
     }

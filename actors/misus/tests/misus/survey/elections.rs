@@ -1,6 +1,6 @@
 //! When the lander is lost for good, the rover that is elected assigns goals and wishes for new ones.
 
-use crate::survey::Run;
+use super::runs::Run;
 
 /// The lander is lost after an hour; something is wished for afterwards, and something is to be learnt.
 const LOST: &str = r#"

@@ -1,6 +1,6 @@
 //! Goals of one's own: they come, change and go, and a combination may be worth less than nothing.
 
-use crate::survey::Run;
+use super::runs::Run;
 
 /// Nothing but goals of one's own, two of them worth a little more than others, and less together.
 const PAIR: &str = r#"

@@ -6,7 +6,7 @@ use farside_misus::shac::{
     Party, Reason, Settings, SettingsError, Standing, WishError,
 };
 
-use crate::team::{Team, goal, pair};
+use super::team::{Team, goal, pair};
 
 const MINUTE: SimDuration = SimDuration::from_secs(60);
 

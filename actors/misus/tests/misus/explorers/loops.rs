@@ -6,7 +6,7 @@ use farside::prelude::*;
 use farside_misus::shac::{GoalKey, Reason};
 use farside_misus::survey::{Activity, ActivityEnd, ReplanCause};
 
-use crate::diary::{Diary, Entry, Run, told};
+use super::diary::{Diary, Entry, Run, told};
 
 /// One rover on a small field, whose goals are given: spectra and images of the first rocks.
 fn alone(more: &str) -> String {
@@ -24,7 +24,7 @@ fn alone(more: &str) -> String {
     text
 }
 
-fn run(more: &str, hours: u64, crashes: &[(&str, u64, u64)]) -> crate::diary::Ran {
+fn run(more: &str, hours: u64, crashes: &[(&str, u64, u64)]) -> super::diary::Ran {
     let text = alone(more);
     let ran = Run {
         text: &text,
@@ -357,7 +357,7 @@ fn on_a_market_rovers_bid_what_a_goal_adds_to_their_plans() {
 
 /// The faults of the scenario that has one of every kind.
 fn every_fault() -> &'static str {
-    let text = include_str!("../../scenarios/faults.toml");
+    let text = include_str!("../../../scenarios/faults.toml");
     let (first, last) = (text.find("[[rover.fault]]"), text.find("[links.default]"));
     &text[first.expect("it has faults")..last.expect("it has links")]
 }

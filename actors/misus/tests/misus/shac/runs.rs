@@ -3,7 +3,7 @@
 use farside_misus::shac::Rules;
 use proptest::prelude::*;
 
-use crate::sharing::{Crash, Partition, Scenario, Tally, Wished, Wishing, World};
+use super::sharing::{Crash, Partition, Scenario, Tally, Wished, Wishing, World};
 
 fn run_all(seeds: std::ops::Range<u64>) -> Tally {
     let mut sum = Tally::default();
@@ -26,7 +26,7 @@ fn random_runs_violate_nothing() {
     assert!(tally.duplicates > 0 && tally.unachievable > 0, "{tally:?}");
 }
 
-/// `cargo test --release -p farside-misus --test shac -- --ignored`
+/// `cargo test --release -p farside-misus --test misus shac -- --ignored`
 #[test]
 #[ignore = "a minute and a half in a release build"]
 fn ten_thousand_random_runs_violate_nothing() {

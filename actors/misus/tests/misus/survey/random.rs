@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use crate::survey::Run;
+use super::runs::Run;
 
 const FAULTS: [&str; 4] = [
     "",

@@ -3,7 +3,7 @@
 
 #[path = "../../examples/support/survey.rs"]
 #[allow(dead_code, reason = "examples use the rest")]
-mod survey;
+mod runs;
 
 mod elections;
 mod loops;

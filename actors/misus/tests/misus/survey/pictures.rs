@@ -4,7 +4,7 @@
 use farside::SimDuration;
 use farside_actors::system::PictureRequest;
 
-use crate::survey::{Run, Tape};
+use super::runs::{Run, Tape};
 
 const PICTURES: [&str; 4] = ["plans", "score", "goals", "tracks"];
 

@@ -1,6 +1,6 @@
 //! What cannot be is said, by key and name.
 
-use crate::survey::Run;
+use super::runs::Run;
 
 fn check(text: &str, expected: &str) {
     let run = Run {

@@ -1,6 +1,6 @@
 //! Each rule is there for something: without it, something is violated.
 
-use crate::sharing::{Partition, RULES, Scenario, Wished, Wishing, World, without};
+use super::sharing::{Partition, RULES, Scenario, Wished, Wishing, World, without};
 use farside_misus::shac::Rules;
 
 /// The rule that is left out, the seed at which the search for a run that shows it begins, and what is

@@ -1,6 +1,6 @@
 //! Goals for two rovers at one time: done by both, or by neither.
 
-use crate::survey::{Ran, Run};
+use super::runs::{Ran, Run};
 
 /// Two rovers, and nothing to do but one goal that needs both.
 const MEET: &str = r#"

@@ -11,7 +11,7 @@ use farside_misus::sharing::{
     Coordinator, Names, Pursuer, RoverMind, RoverMove, TeamMind, TeamMove,
 };
 
-use crate::team::{goal, pair};
+use super::team::{goal, pair};
 
 const GOALS: u32 = 9;
 

@@ -13,7 +13,7 @@ use farside_misus::planner::problem::{Problem, ProblemConfig, generate};
 use farside_misus::planner::rounds::{run, team_plan};
 
 /// What `misus_exact.py` and `misus_bound.py` have found, as it is built in.
-const TABLE: &str = include_str!("../../bounds.csv");
+const TABLE: &str = include_str!("../../../bounds.csv");
 
 /// The best plans that anybody has found of the problems of ten rocks.
 const BEST: &str = include_str!("best_of_ten_rocks.csv");
@@ -99,7 +99,7 @@ fn of_twenty_proven_optima_rovers_reach_nine_tenths_and_the_team_almost_all() {
     );
 }
 
-/// `cargo test --release -p farside-misus --test planners -- --ignored`: half a second of one core for each problem.
+/// `cargo test --release -p farside-misus --test misus planners -- --ignored`: half a second of one core for each problem.
 #[test]
 #[ignore = "ten seconds in a release build"]
 fn of_twenty_proven_optima_the_team_reaches_all_but_a_twentieth_in_a_second() {

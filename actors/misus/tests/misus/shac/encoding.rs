@@ -9,7 +9,7 @@ use farside_misus::shac::{
 };
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::team::{Team, goal, pair};
+use super::team::{Team, goal, pair};
 
 fn comes_back<T: Serialize + DeserializeOwned + PartialEq + Debug + 'static>(value: &T) {
     let schema = Schema::of::<T>().unwrap();

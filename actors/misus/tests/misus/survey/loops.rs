@@ -2,8 +2,8 @@
 
 use farside::prelude::*;
 
-use crate::pictures;
-use crate::survey::Run;
+use super::pictures;
+use super::runs::Run;
 
 /// Noon of the first sol, from the start of the run at 7 in the morning \[h\].
 const NOON_H: f64 = 5.0;
