@@ -121,8 +121,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let mut inputs = plan.inputs.clone();
     inputs.push(PathBuf::from(&args.study));
     if let Some(shards) = args.array {
-        output::spare(&inputs, &[])?;
-        return array::write(args, shards, &plan, &folder);
+        return array::write(args, shards, &plan, &folder, &inputs);
     }
     let mut outputs = study::outputs(&folder, args.shard.unwrap_or(Shard::WHOLE));
     outputs.extend(args.junit.clone());

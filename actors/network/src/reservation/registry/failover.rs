@@ -51,9 +51,9 @@ impl RegionFailover {
         }
     }
 
-    /// What is open of these requests is so no more.
-    pub(crate) fn close(&mut self, requests: impl Fn(&ReservationRequest) -> bool) {
-        self.open.retain(|reserve| !requests(&reserve.request));
+    /// What is open of a request is so no more.
+    pub(crate) fn close(&mut self, request: &ReservationRequest) {
+        self.open.retain(|reserve| reserve.request != *request);
     }
 
     pub(crate) fn is_proposed(&self, request: &ReservationRequest) -> bool {
@@ -90,6 +90,18 @@ impl Registry {
         };
         self.forward(confirmed);
         true
+    }
+
+    /// Earlier attempts than this one have failed. Whoever was to say so may have been replaced before,
+    /// and then nobody else tells those from whom the paths came, which this attempt need not pass.
+    pub(crate) fn release_earlier(&mut self, desk: &Desk<'_>, request: &ReservationRequest) {
+        let open = std::mem::take(&mut self.failover.open).into_iter();
+        let (earlier, others) = open.partition(|open| open.request.is_before(request));
+        self.failover.open = others;
+        let earlier: Vec<Reserve> = earlier;
+        for reserve in earlier {
+            self.release(desk, &reserve, reserve.at as usize + 1);
+        }
     }
 
     /// All of a path is entered, tentatively: its rover is asked to take it.
