@@ -34,7 +34,7 @@ const CASES: &[Case] = &[
     },
     Case {
         line: "run map.toml --out OUT",
-        reads: &["map.toml", "a.map", "a.scen"],
+        reads: &["map.toml", "rubble-32-32-10.map", "rubble-32-32-10.scen"],
     },
     Case {
         line: "check contacts.toml",
@@ -191,8 +191,14 @@ fn folder() -> tempfile::TempDir {
     for (from, to) in [
         ("actors/planning/models/rover.ddl", "rover.ddl"),
         ("actors/planning/models/rover-problem.ddl", "problem.ddl"),
-        ("worlds/data/movingai/rubble-32-32-10.map", "a.map"),
-        ("worlds/data/movingai/rubble-32-32-10.scen", "a.scen"),
+        (
+            "worlds/data/movingai/rubble-32-32-10.map",
+            "rubble-32-32-10.map",
+        ),
+        (
+            "worlds/data/movingai/rubble-32-32-10.scen",
+            "rubble-32-32-10.scen",
+        ),
         ("worlds/data/contacts/rover-radio.down", "trace.down"),
     ] {
         std::fs::copy(repository.join(from), at.join(to)).unwrap();
@@ -217,7 +223,7 @@ fn folder() -> tempfile::TempDir {
         (
             "map.toml",
             "system = 'network'\nuntil = '5s'\n[team]\nrovers = 2\n\
-             [world]\nroadmap = 'a.map'\ntasks = 'a.scen'\nnodes = 4\n[network]\npolicy = 'complete'\n",
+             [world]\nroadmap = 'rubble-32-32-10.map'\ntasks = 'rubble-32-32-10.scen'\nnodes = 4\n[network]\npolicy = 'complete'\n",
         ),
         ("study.toml", study),
     ] {
@@ -381,7 +387,8 @@ fn every_command_is_in_the_table() {
             let Some((option, value)) = line.trim().split_once(" <") else {
                 continue;
             };
-            let is_file = value.contains('.') || value.contains("FILE") || value.contains("DIR");
+            let value = value.split('>').next().unwrap_or_default();
+            let is_file = value.contains('.') || value == "FILE" || value == "DIR";
             let Some(option) = option.split(' ').find(|word| word.starts_with("--")) else {
                 continue;
             };
