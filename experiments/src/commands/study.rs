@@ -126,6 +126,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let mut outputs = study::outputs(&folder, args.shard.unwrap_or(Shard::WHOLE));
     outputs.extend(args.junit.clone());
     output::spare(&inputs, &outputs)?;
+    // The results folder is made by then.
+    let elsewhere = args.junit.iter().find(|junit| !junit.starts_with(&folder));
+    elsewhere.map_or(Ok(()), |junit| output::may_be_made(junit))?;
     if let (Some(junit), Some(check)) = (&args.junit, &args.check) {
         output::spare(&against::files(check), std::slice::from_ref(junit))?;
     }

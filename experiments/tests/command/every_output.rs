@@ -89,11 +89,11 @@ const CASES: &[Case] = &[
         reads: &["run.mcap"],
     },
     Case {
-        line: "draw run.mcap --sequence --out OUT",
+        line: "draw run.mcap --sequence mermaid --out OUT",
         reads: &["run.mcap"],
     },
     Case {
-        line: "plot run.mcap rover_*:whereabouts.step --out OUT",
+        line: "plot run.mcap /state/rover_*/rover_state.transmit_energy_j --out OUT",
         reads: &["run.mcap"],
     },
     Case {
@@ -344,6 +344,10 @@ fn where_no_file_can_be_is_named() {
         let left = std::fs::read_dir(at.join("taken")).unwrap().count();
         assert_eq!(left, 1, "{}", case.line);
         assert!(!at.join("no").exists(), "{}", case.line);
+    }
+    // It is known before the study is done, or the search is begun.
+    for name in ["new", "taken.tried", "small.toml"] {
+        assert!(!at.join(name).exists(), "{name}");
     }
     let parts = std::fs::read_dir(at).unwrap().flatten();
     let parts = parts.filter(|entry| entry.file_name().to_string_lossy().contains(".part"));

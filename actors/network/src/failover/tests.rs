@@ -673,3 +673,24 @@ fn what_a_failed_attempt_entered_is_struck_out_where_the_next_does_not_come() {
     let detail = report.end.detail();
     assert_eq!(metrics.arrived, 37, "{detail} {:?}", metrics.failed_over);
 }
+
+/// A path passes a region twice, which is replaced between the two: what was entered there first is lost,
+/// and the rover does not set out on what is left of it.
+#[test]
+fn no_path_is_taken_that_a_replaced_region_has_half_of() {
+    let trial = Trial {
+        rovers: 37,
+        link: Bad {
+            jitter_ms: 343,
+            duplicates: 0.057_585_725_835_033_526,
+            ..GOOD
+        },
+        crashes: vec![(9, 1176, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 500)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 37, "{detail} {:?}", metrics.failed_over);
+}

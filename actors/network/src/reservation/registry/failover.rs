@@ -14,7 +14,9 @@
 //! it until it is settled, and passes it on once more when the region is replaced. It comes to the
 //! first node again, which says what became of the request: taken, or not. The first nodes of
 //! requests that are under way begin them anew, because what they wait for may have been lost with
-//! the region.
+//! the region. Whoever hears of a later attempt passes on that the earlier one has failed: nobody
+//! else may be left to do so. A path that passes a region twice fails if the region was replaced
+//! between the two.
 
 use farside_worlds::NodeId;
 
@@ -90,6 +92,18 @@ impl Registry {
         };
         self.forward(confirmed);
         true
+    }
+
+    /// Whether a path that passes this region more than once has lost a later part, which was entered before
+    /// the region was replaced: the rover would be told that all of it was reserved at the new rank.
+    pub(crate) fn has_lost_part(&self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
+        let later = reserve.path.iter().skip(reserve.at as usize + 1);
+        let mut mine = later.filter(|visit| desk.site.sensors.owner(visit.vertex) == desk.region);
+        mine.any(|visit| {
+            !self
+                .table
+                .has(&reserve.request, std::slice::from_ref(visit))
+        })
     }
 
     /// Earlier attempts than this one have failed. Whoever was to say so may have been replaced before,

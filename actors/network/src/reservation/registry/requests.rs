@@ -217,6 +217,10 @@ impl Registry {
                 return;
             }
         }
+        if desk.may_be_replaced() && self.has_lost_part(desk, &reserve) {
+            self.refuse(desk, &reserve, lo);
+            return;
+        }
         // A rover that stands on the map has its first vertex already.
         let stands = lo == 0 && desk.site.stay_at_target;
         let first = lo + usize::from(stands);
