@@ -20,6 +20,7 @@ mod network_safety;
 mod network_team;
 mod outside;
 mod panics;
+mod panics_aside;
 mod refusals;
 mod replay;
 mod scale;

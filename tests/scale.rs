@@ -3,6 +3,9 @@
 use std::time::Duration;
 
 use farside::prelude::*;
+use farside_logs::{LogOptions, LogWriter, info};
+use farside_tests::executors::WAYS;
+use serde::{Deserialize, Serialize};
 
 struct Idle;
 
@@ -65,4 +68,57 @@ fn very_many_hosts_are_declared_at_once() {
         done.send(())
     });
     answer.recv_timeout(PATIENCE).expect("no hang, no panic");
+}
+
+/// Sends itself one message.
+struct Once;
+
+impl Actor for Once {
+    type Accepts = (Mark,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.timer(SimDuration::from_secs(1), Mark);
+        Ok(())
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Mark;
+
+impl Handler<Mark> for Once {
+    fn handle(&mut self, _mark: Mark, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+/// MCAP numbers topics in 16 bits. A run of more actors than that is logged all the same, each event of it.
+#[test]
+fn more_actors_than_a_log_has_numbers_for_topics_are_logged() {
+    const ACTORS: u64 = 66_000;
+    let build = |heavy: bool| {
+        let mut sim = Simulation::new(1);
+        let hosts = ["a", "b"].map(|name| sim.host(name));
+        for host in hosts.into_iter().filter(|_| heavy) {
+            sim.heavy(host);
+        }
+        for at in 0..ACTORS {
+            sim.actor(hosts[at as usize % 2], &format!("x{at}"), |_| Once);
+        }
+        sim
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let reports = WAYS.map(|(executor, heavy)| {
+        let path = folder.path().join("run.mcap");
+        let mut sim = build(heavy);
+        sim.observe(LogWriter::create(&path, LogOptions::default()).expect("it can be created"));
+        let report = sim.run(executor).expect("it can start");
+        let run = info(&path).expect("it is a log").run.expect("of a run");
+        assert_eq!(run.digest, Some(report.digest.to_string()));
+        report
+    });
+    assert_eq!(reports[0].end.name(), "completed");
+    assert_eq!(reports[0].counts.events, 2 * ACTORS);
+    for report in &reports {
+        assert_eq!(*report, reports[0]);
+    }
 }

@@ -1,8 +1,10 @@
 //! What may be written where: no command writes over a file that it reads, and a log takes the place
 //! of another log only.
 
-use std::fs::Metadata;
+use std::fs::{File, Metadata, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use crate::error::LogError;
 use crate::source::Source;
@@ -57,6 +59,48 @@ pub fn may_hold_log(out: &Path, inputs: &[PathBuf]) -> Result<(), LogError> {
         false => Ok(()),
     }
 }
+
+/// The lock of a file that is to be replaced by another one, if there is a file: nobody is writing it, and
+/// nobody begins to as long as the lock is kept.
+///
+/// # Errors
+/// [`LogError::Busy`], or if it cannot be opened.
+pub(crate) fn lock_replaced(path: &Path) -> Result<Option<File>, LogError> {
+    let file = match File::options().append(true).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(LogError::io(path, "create", error)),
+    };
+    lock(&file, path)?;
+    Ok(Some(file))
+}
+
+/// Locks a file to be written. A process that starts another one shares its open files with it for a
+/// moment, and with them the lock of a file that it has closed: what is locked then is free soon.
+///
+/// # Errors
+/// [`LogError::Busy`], or if it cannot be locked. Some file systems know no locks, which is no error.
+pub(crate) fn lock(file: &File, path: &Path) -> Result<(), LogError> {
+    let mut locked = file.try_lock();
+    for _ in 0..PATIENCE {
+        if !matches!(locked, Err(TryLockError::WouldBlock)) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+        locked = file.try_lock();
+    }
+    match locked {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(LogError::Busy {
+            path: path.to_owned(),
+        }),
+        Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => Ok(()),
+        Err(TryLockError::Error(error)) => Err(LogError::io(path, "lock", error)),
+    }
+}
+
+/// How often a lock is tried again.
+const PATIENCE: u32 = 50;
 
 /// True if the two are one file by two names, as with hard links.
 #[cfg(unix)]

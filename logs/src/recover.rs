@@ -10,7 +10,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::LogError;
-use crate::output::may_hold_log;
+use crate::output::{lock_replaced, may_hold_log};
 use crate::salvage::{Hints, Part, Salvage};
 use crate::shown::Shown;
 use crate::source::Source;
@@ -132,11 +132,12 @@ impl fmt::Display for RecoverReport {
 ///
 /// # Errors
 /// If `broken` does not even start like an MCAP file, or `out` is the same file by any name, is
-/// there and no log, or cannot be written.
+/// there and no log, is being written by a run, or cannot be written.
 pub fn recover(broken: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RecoverReport, LogError> {
     let (broken, out) = (broken.as_ref(), out.as_ref());
     let mut source = Source::open(broken)?;
     may_be_written(broken, out)?;
+    let _lock = lock_replaced(out)?;
     let hints = Hints::read(&mut source)?;
     // First what is declared anywhere in the file: what a message needs may come behind it.
     let mut known = FirstDeclared::default();

@@ -2,7 +2,7 @@
 //! another kind.
 
 use std::fs::Metadata;
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 use farside_actors::figure::Figure;
@@ -233,7 +233,7 @@ pub(super) fn write_bytes(
 /// there. `bytes` begin as what is to be written.
 ///
 /// # Errors
-/// If it may not.
+/// If it may not, or cannot be made.
 pub(super) fn may_write(
     path: &Path,
     bytes: &[u8],
@@ -241,6 +241,7 @@ pub(super) fn may_write(
     inputs: &[PathBuf],
 ) -> Result<(), CommandError> {
     refuse_input(path, inputs)?;
+    may_be_made(path)?;
     match is_in_the_way(path, format.beginning(bytes)) {
         true => Err(CommandError::InTheWay {
             path: path.to_owned(),
@@ -248,6 +249,27 @@ pub(super) fn may_write(
         }),
         false => Ok(()),
     }
+}
+
+/// That a file can be where `path` leads: no folder is in the way, and there is one to make it in. To be asked
+/// before what takes long.
+///
+/// # Errors
+/// If it cannot.
+pub(super) fn may_be_made(path: &Path) -> Result<(), CommandError> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let kind = match folder {
+        _ if path.is_dir() => ErrorKind::IsADirectory,
+        Some(folder) if !folder.exists() => ErrorKind::NotFound,
+        Some(folder) if !folder.is_dir() => ErrorKind::NotADirectory,
+        _ => return Ok(()),
+    };
+    Err(CommandError::Write {
+        path: path.to_owned(),
+        source: kind.into(),
+    })
 }
 
 /// Writes a file that is there once it is whole: a reader never sees a part of it.

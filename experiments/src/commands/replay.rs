@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::kinds::{self, FileKind};
 use super::logged::scenario_in;
-use super::{CommandError, Exit, interrupt, print, print_json, progress};
+use super::{CommandError, Exit, interrupt, output, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario, check_replay};
 
@@ -70,6 +70,7 @@ struct Job<'a> {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let path = &args.log;
     kinds::expect(FileKind::Log, path, registry)?;
+    output::spare(std::slice::from_ref(path), &[])?;
     // What the log says at its start: to read all of it for its summary would double the work.
     let log = Log::open(path)?;
     let summary = RunSummary {

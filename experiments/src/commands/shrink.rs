@@ -121,9 +121,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let files = scenario.assemble()?.files;
     let mut inputs = files.paths();
     inputs.push(PathBuf::from(&args.input));
-    output::spare(&inputs, &[args.out.clone(), state.clone()])?;
-    output::may_write(&args.out, BEGINNING.as_bytes(), Format::Small, &inputs)?;
     let missing = beside(&args.out, &files).map_err(CommandError::Arguments)?;
+    let mut outputs: Vec<PathBuf> = missing.iter().map(|(path, _)| path.clone()).collect();
+    outputs.extend([args.out.clone(), state.clone()]);
+    output::spare(&inputs, &outputs)?;
+    output::may_write(&args.out, BEGINNING.as_bytes(), Format::Small, &inputs)?;
     let stop = Arc::new(AtomicBool::new(false));
     interrupt::raise_on_interrupt(stop.clone());
     let progress = Progress::new();

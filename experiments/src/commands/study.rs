@@ -121,12 +121,14 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let mut inputs = plan.inputs.clone();
     inputs.push(PathBuf::from(&args.study));
     if let Some(shards) = args.array {
-        output::spare(&inputs, &[])?;
-        return array::write(args, shards, &plan, &folder);
+        return array::write(args, shards, &plan, &folder, &inputs);
     }
     let mut outputs = study::outputs(&folder, args.shard.unwrap_or(Shard::WHOLE));
     outputs.extend(args.junit.clone());
     output::spare(&inputs, &outputs)?;
+    // The results folder is made by then.
+    let elsewhere = args.junit.iter().find(|junit| !junit.starts_with(&folder));
+    elsewhere.map_or(Ok(()), |junit| output::may_be_made(junit))?;
     if let (Some(junit), Some(check)) = (&args.junit, &args.check) {
         output::spare(&against::files(check), std::slice::from_ref(junit))?;
     }

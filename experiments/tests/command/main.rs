@@ -5,6 +5,7 @@ mod browser;
 mod cluster;
 mod common;
 mod contacts;
+mod every_output;
 mod guide;
 mod ink;
 mod layouts;

@@ -349,9 +349,47 @@ fn a_log_that_is_being_written_is_not_replaced() {
         "run.mcap",
         "another run is writing it",
     );
+    // What is renamed to its place would take it away from that run as well.
+    let another = farside(at, &["run", "s.toml", "--out", "another.mcap"]);
+    assert!(another.status.success(), "{}", text(&another.stderr));
+    refused(
+        at,
+        &["recover", "another.mcap", "--out", "run.mcap"],
+        "run.mcap",
+        "another run is writing it",
+    );
     drop(writer);
+    let recovered = farside(at, &["recover", "another.mcap", "--out", "run.mcap"]);
+    assert!(recovered.status.success(), "{}", text(&recovered.stderr));
     let output = farside(at, &["run", "s.toml"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
+/// What a scenario reads is put beside the small one: not where the small one itself is to be.
+#[test]
+fn a_small_scenario_does_not_lie_where_a_file_that_it_reads_is_put() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let plan = "a contact +0 +3600 1 2 1000\na range +0 +3600 1 2 1\n";
+    std::fs::write(at.join("plan.txt"), plan).unwrap();
+    let scenario = "system = 'traffic'\nuntil = '5s'\n[traffic]\nhosts = ['a', 'b']\n\
+        flow = [{ from = 'a', to = 'b', size = '100B', period = '1s' }]\n\
+        [contacts]\nfile = 'plan.txt'\nnodes = { 1 = 'a', 2 = 'b' }\n";
+    std::fs::write(at.join("s.toml"), scenario).unwrap();
+    std::fs::create_dir(at.join("other")).unwrap();
+    let shrink = ["shrink", "s.toml", "--violates", "sent>0", "--budget", "9"];
+    for more in [
+        &["--out", "other/plan.txt"][..],
+        &["--out", "other/s.toml", "--state", "other/plan.txt"],
+    ] {
+        let output = farside(at, &[&shrink, more].concat());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{more:?}: {said}");
+        let twice = "other/plan.txt: is written to by this command twice";
+        assert!(said.contains(twice), "{more:?}: {said}");
+        let left = std::fs::read_dir(at.join("other")).unwrap().count();
+        assert_eq!(left, 0, "{more:?}");
+    }
 }
 
 /// Letters that a terminal obeys: the end of lines and tabs aside.

@@ -2,17 +2,17 @@
 //! their buffers back.
 
 use std::collections::BTreeMap;
-use std::fs::{OpenOptions, TryLockError};
+use std::fs::OpenOptions;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use super::Compression;
 use super::chunk::Chunk;
 use super::file::McapFile;
 use crate::LogError;
+use crate::output::lock;
 
 /// Chunks on their way to the thread before the run waits.
 const QUEUE_CHUNKS: usize = 3;
@@ -31,38 +31,13 @@ pub(super) fn create(
     let file = file.map_err(failed)?;
     // Devices and pipes take what comes, whoever it is from.
     if file.metadata().is_ok_and(|found| found.is_file()) {
-        match locked(&file) {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(LogError::Busy {
-                    path: path.to_owned(),
-                });
-            }
-            // Some file systems know no locks.
-            Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
-            Err(TryLockError::Error(error)) => return Err(LogError::io(path, "lock", error)),
-        }
+        lock(&file, path)?;
         file.set_len(0).map_err(failed)?;
     }
     // What is larger than the buffer, as chunks mostly are, is not copied into it.
     McapFile::create(BufWriter::new(file), compression, library(code_version))
         .map_err(|error| LogError::io(path, "write", error))
 }
-
-/// Locks a file. A process that starts another one shares its open files with it for a moment, and with them
-/// the lock of a file that it has closed: what is locked then is free soon.
-fn locked(file: &std::fs::File) -> Result<(), TryLockError> {
-    for _ in 0..PATIENCE {
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
-            other => return other,
-        }
-    }
-    file.try_lock()
-}
-
-/// How often a lock is tried again.
-const PATIENCE: u32 = 50;
 
 /// What a log says wrote it: this library, or the binary of somebody else's whose version names it.
 fn library(code_version: &str) -> String {

@@ -650,3 +650,47 @@ fn a_backup_that_was_replaced_is_passed_over() {
     let detail = report.end.detail();
     assert_eq!(metrics.arrived, 15, "{detail} {:?}", metrics.failed_over);
 }
+
+/// An attempt fails with a node that is cut off and replaced. The next one leads past those ahead of
+/// that node and not past those behind it: these are told as well that the first one has failed.
+#[test]
+fn what_a_failed_attempt_entered_is_struck_out_where_the_next_does_not_come() {
+    let trial = Trial {
+        rovers: 37,
+        link: Bad {
+            loss: 0.034_094_158_058_455_91,
+            jitter_ms: 519,
+            duplicates: 0.137_240_452_782_752_8,
+            ..GOOD
+        },
+        unheard: vec![(27, (15, 23))],
+        crashes: vec![(18, 3708, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 398)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 37, "{detail} {:?}", metrics.failed_over);
+}
+
+/// A path passes a region twice, which is replaced between the two: what was entered there first is lost,
+/// and the rover does not set out on what is left of it.
+#[test]
+fn no_path_is_taken_that_a_replaced_region_has_half_of() {
+    let trial = Trial {
+        rovers: 37,
+        link: Bad {
+            jitter_ms: 343,
+            duplicates: 0.057_585_725_835_033_526,
+            ..GOOD
+        },
+        crashes: vec![(9, 1176, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 500)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 37, "{detail} {:?}", metrics.failed_over);
+}

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::super::{CommandError, Exit, print, print_json};
+use super::super::{CommandError, Exit, output, print, print_json};
 use super::Args;
 use crate::study::StudyPlan;
 
@@ -48,13 +48,14 @@ struct JobArray<'a> {
 /// Writes the scripts for `shards` shards, and says how they are submitted.
 ///
 /// # Errors
-/// When there are more shards than runs, when a path is not UTF-8, or when a script is there
-/// already and another: somebody may have changed it for a cluster.
+/// When there are more shards than runs, when a path is not UTF-8, when a script is one of the
+/// `inputs`, or when it is there already and another: somebody may have changed it for a cluster.
 pub(super) fn write(
     args: &Args,
     shards: u32,
     plan: &StudyPlan,
     folder: &Path,
+    inputs: &[PathBuf],
 ) -> Result<Exit, CommandError> {
     let parts = plan.most_shards();
     if shards as usize > parts {
@@ -85,6 +86,7 @@ pub(super) fn write(
         ("submit.sh", array.submit()),
     ];
     let paths = files.each_ref().map(|(name, _)| scripts.join(name));
+    output::spare(inputs, &paths)?;
     for (path, (_, text)) in paths.iter().zip(&files) {
         refuse_changed(path, text)?;
     }

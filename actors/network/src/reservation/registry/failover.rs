@@ -14,7 +14,9 @@
 //! it until it is settled, and passes it on once more when the region is replaced. It comes to the
 //! first node again, which says what became of the request: taken, or not. The first nodes of
 //! requests that are under way begin them anew, because what they wait for may have been lost with
-//! the region.
+//! the region. Whoever hears of a later attempt passes on that the earlier one has failed: nobody
+//! else may be left to do so. A path that passes a region twice fails if the region was replaced
+//! between the two.
 
 use farside_worlds::NodeId;
 
@@ -51,9 +53,9 @@ impl RegionFailover {
         }
     }
 
-    /// What is open of these requests is so no more.
-    pub(crate) fn close(&mut self, requests: impl Fn(&ReservationRequest) -> bool) {
-        self.open.retain(|reserve| !requests(&reserve.request));
+    /// What is open of a request is so no more.
+    pub(crate) fn close(&mut self, request: &ReservationRequest) {
+        self.open.retain(|reserve| reserve.request != *request);
     }
 
     pub(crate) fn is_proposed(&self, request: &ReservationRequest) -> bool {
@@ -90,6 +92,30 @@ impl Registry {
         };
         self.forward(confirmed);
         true
+    }
+
+    /// Whether a path that passes this region more than once has lost a later part, which was entered before
+    /// the region was replaced: the rover would be told that all of it was reserved at the new rank.
+    pub(crate) fn has_lost_part(&self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
+        let later = reserve.path.iter().skip(reserve.at as usize + 1);
+        let mut mine = later.filter(|visit| desk.site.sensors.owner(visit.vertex) == desk.region);
+        mine.any(|visit| {
+            !self
+                .table
+                .has(&reserve.request, std::slice::from_ref(visit))
+        })
+    }
+
+    /// Earlier attempts than this one have failed. Whoever was to say so may have been replaced before,
+    /// and then nobody else tells those from whom the paths came, which this attempt need not pass.
+    pub(crate) fn release_earlier(&mut self, desk: &Desk<'_>, request: &ReservationRequest) {
+        let open = std::mem::take(&mut self.failover.open).into_iter();
+        let (earlier, others) = open.partition(|open| open.request.is_before(request));
+        self.failover.open = others;
+        let earlier: Vec<Reserve> = earlier;
+        for reserve in earlier {
+            self.release(desk, &reserve, reserve.at as usize + 1);
+        }
     }
 
     /// All of a path is entered, tentatively: its rover is asked to take it.

@@ -196,7 +196,7 @@ impl Registry {
             return;
         }
         self.table.strike_earlier(&reserve.request);
-        self.failover.close(|open| open.is_before(&reserve.request));
+        self.release_earlier(desk, &reserve.request);
         self.claims.give_up(reserve.request.rover);
         let hi = reserve.at as usize;
         let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.region;
@@ -216,6 +216,10 @@ impl Registry {
                 self.release(desk, &reserve, lo);
                 return;
             }
+        }
+        if desk.may_be_replaced() && self.has_lost_part(desk, &reserve) {
+            self.refuse(desk, &reserve, lo);
+            return;
         }
         // A rover that stands on the map has its first vertex already.
         let stands = lo == 0 && desk.site.stay_at_target;
@@ -292,7 +296,7 @@ impl Registry {
             _ => self.table.strike(request),
         }
         if desk.may_be_replaced() {
-            self.failover.close(|open| open == request);
+            self.failover.close(request);
             if verdict == Verdict::Confirmed {
                 self.failover.take(*request);
             }
