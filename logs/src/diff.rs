@@ -382,7 +382,7 @@ pub fn diff(
     Ok(comparison::compare(a.as_ref(), b.as_ref(), options, limits)?.0)
 }
 
-/// How a comparison goes about it: changes its speed and its memory, never what it finds.
+/// How a comparison goes about it: changes its speed and its memory, but for one never what it finds.
 #[derive(Clone, Copy)]
 pub(crate) struct Limits {
     /// How many entries of each log may be in memory.
@@ -393,6 +393,9 @@ pub(crate) struct Limits {
     message_bytes: usize,
     /// Whether the front of both is passed over as long as it agrees.
     passes_front: bool,
+    /// How many messages are kept in mind that have another place in their flow in the other log. With more
+    /// than these a message may be paired with another one, and the report says so.
+    shifted: usize,
 }
 
 impl Limits {
@@ -409,6 +412,7 @@ impl Default for Limits {
             pairs: 64 << 10,
             message_bytes: 64 << 20,
             passes_front: true,
+            shifted: 256 << 10,
         }
     }
 }

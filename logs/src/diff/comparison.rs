@@ -185,7 +185,7 @@ impl<'a> Comparison<'a> {
             sample: BTreeMap::new(),
             renumbered,
             left: (Buckets::new(limits.left()), Buckets::new(limits.left())),
-            shifts: Shifts::default(),
+            shifts: Shifts::new(limits.shifted),
             to_read: Buckets::new(limits.pairs),
             places: Buckets::new(limits.pairs),
             earliest: None,
