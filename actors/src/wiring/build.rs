@@ -395,6 +395,22 @@ impl LinkBuilder {
         });
     }
 
+    /// What the link from one host to another has when, as it will be built: for who asks of a run what its links
+    /// had.
+    ///
+    /// ```
+    /// use farside::SimTime;
+    /// use farside_actors::link::LinksConfig;
+    /// use farside_actors::wiring::LinkBuilder;
+    /// let config: LinksConfig = toml::from_str("'base-rover_*' = { loss = 0.5 }").unwrap();
+    /// let timeline = LinkBuilder::new(&config, &[])?.between("base", "rover_1");
+    /// assert_eq!(timeline.at(SimTime::ZERO).loss, 0.5);
+    /// # Ok::<(), farside_actors::link::LinkConfigError>(())
+    /// ```
+    pub fn between(&mut self, from: &str, to: &str) -> Arc<Timeline> {
+        self.resolve(from, to).timeline.clone()
+    }
+
     /// What the link `{from}-{to}` has, and when.
     fn resolve(&mut self, from: &str, to: &str) -> &SharedTimeline {
         let name = format!("{from}-{to}");

@@ -251,7 +251,7 @@ impl Logs {
     }
 
     fn compare(&self, options: &DiffOptions, limits: Limits) -> (DiffReport, Usage) {
-        comparison::compare(&self.a, &self.b, options, limits).unwrap()
+        comparison::compare(&self.a, &self.b, options, limits, None).unwrap()
     }
 }
 
@@ -494,7 +494,8 @@ fn what_agreed_is_read_by_field_where_a_later_schema_differs() {
         writer.finish().unwrap();
         path
     });
-    let compare = |limits| comparison::compare(&a, &b, &DiffOptions::default(), limits).unwrap();
+    let compare =
+        |limits| comparison::compare(&a, &b, &DiffOptions::default(), limits, None).unwrap();
     let (expected, _) = compare(ways()[0]);
     let (found, usage) = compare(Limits::default());
     assert_eq!(found, expected);
