@@ -313,6 +313,17 @@ impl Records {
         self.scanner.current().ok_or_else(gone)
     }
 
+    /// Passes over records by what they say; see [`Records::passed`].
+    pub(crate) fn pass_over(&mut self, which: impl Fn(&[u8]) -> bool + Send + 'static) {
+        self.scanner.pass_over_records(which);
+    }
+
+    /// When the last record is that was passed over, where, and on which channel.
+    pub(crate) fn passed(&self) -> Option<(u64, Position, u32)> {
+        let (head, position, serial) = self.scanner.passed()?;
+        Some((head.log_time, position, serial))
+    }
+
     /// A message that was read before, with the serial number of its channel.
     pub(crate) fn message_at(
         &mut self,

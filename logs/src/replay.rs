@@ -58,13 +58,15 @@ pub fn replay(
         replay.charge(charge);
     }
     let info = replay.info().clone();
-    let names = Names::of(&replay);
+    let names = Arc::new(Names::of(&replay));
     let live = accepted(&replay);
     let wrong = |reason: String| LogError::Replay {
         path: log.path().to_owned(),
         reason,
     };
     let mut records = log.records_but(names.far_samples())?;
+    let concerning = names.clone();
+    records.pass_over(move |envelope| !concerning.concern(envelope));
     let mut schemas: BTreeMap<String, Arc<SchemaInfo>> = BTreeMap::new();
     let mut last = Last::default();
     loop {
@@ -86,6 +88,7 @@ pub fn replay(
             Step::Record => {
                 let message = records.message()?;
                 last.meet(&message);
+                // Messages outside chunks, and what was in flight, are not passed over.
                 if !names.concern(message.data) {
                     continue;
                 }
@@ -96,6 +99,7 @@ pub fn replay(
             }
         }
     }
+    last.pass(records.passed());
     let end = last.end_of(&mut records, log.head().epoch_ns, &names)?;
     let report = replay.finish(end);
     let ending = records.ending();
@@ -126,6 +130,17 @@ impl Last {
         self.log_time = message.head.log_time;
         if !message.channel.topic.starts_with("/in_flight/") {
             self.place = Some((message.position, message.channel.serial));
+        }
+    }
+
+    /// Of what was passed over the last record.
+    fn pass(&mut self, passed: Option<(u64, Position, u32)>) {
+        let Some((log_time, position, serial)) = passed else {
+            return;
+        };
+        self.log_time = self.log_time.max(log_time);
+        if self.place.is_none_or(|(known, _)| known < position) {
+            self.place = Some((position, serial));
         }
     }
 

@@ -91,7 +91,13 @@ pub(crate) struct Scanner {
     last: Option<(MessageHeader, Position, Within)>,
     /// Chunks are not opened.
     leaves_chunks: bool,
+    /// Which messages of chunks are passed over by what they say, and the last of those.
+    passes: Option<Passes>,
+    passed: Option<(MessageHeader, Position)>,
 }
+
+/// Whether a message is passed over, by its first bytes.
+type Passes = Box<dyn Fn(&[u8]) -> bool + Send>;
 
 /// Which buffer holds a message.
 #[derive(Clone, Copy, PartialEq)]
@@ -127,6 +133,8 @@ impl Scanner {
             over: false,
             last: None,
             leaves_chunks: false,
+            passes: None,
+            passed: None,
         })
     }
 
@@ -135,6 +143,17 @@ impl Scanner {
         let mut scanner = Scanner::open(path)?;
         scanner.leaves_chunks = true;
         Ok(scanner)
+    }
+
+    /// Passes over messages of records, but for what was in flight, by what they say, as far as they are in chunks.
+    pub(crate) fn pass_over_records(&mut self, which: impl Fn(&[u8]) -> bool + Send + 'static) {
+        self.passes = Some(Box::new(which));
+    }
+
+    /// Where the last record is that was passed over by what it says, and with which channel.
+    pub(crate) fn passed(&self) -> Option<(MessageHeader, Position, u32)> {
+        let (head, position) = self.passed?;
+        Some((head, position, self.channel(head.channel_id)?.serial))
     }
 
     /// Passes over the messages of these channels, which are asked for as they are declared.
@@ -398,6 +417,7 @@ impl Scanner {
     }
 
     /// Handles the next record of the open chunk.
+    #[inline]
     fn inner(&mut self) -> Result<Found, String> {
         const CUT: &str = "a chunk that ends within a record";
         let start = self.next_inner;
@@ -410,16 +430,23 @@ impl Scanner {
         match opcode {
             op::MESSAGE => {
                 let head = message_header(content).ok_or_else(malformed)?;
-                match self.declared.slot(head.channel_id) {
+                let is_looked_at = match self.declared.slot(head.channel_id) {
                     Some(slot) if slot.is_passed_over => return Ok(Found::Other),
-                    Some(_) => {}
+                    Some(slot) => slot.is_looked_at,
                     None => return Ok(Found::Stray(undeclared(head.channel_id))),
-                }
+                };
                 let inner = u32::try_from(start).map_err(|_| malformed())?;
                 let position = Position {
                     frame: self.chunk_frame,
                     inner,
                 };
+                if let Some(passes) = &self.passes
+                    && is_looked_at
+                    && passes(&content[MESSAGE_HEADER_BYTES..])
+                {
+                    self.passed = Some((head, position));
+                    return Ok(Found::Other);
+                }
                 Ok(Found::Message(head, position))
             }
             op::SCHEMA | op::CHANNEL => {
@@ -491,6 +518,8 @@ struct Slot {
     channel: Arc<ChannelInfo>,
     /// Its messages are wanted by nobody.
     is_passed_over: bool,
+    /// Its messages are wanted by what they say.
+    is_looked_at: bool,
 }
 
 impl Declared {
@@ -563,7 +592,9 @@ impl Declared {
         });
         self.all.push(info.clone());
         let is_passed_over = self.passed_over.as_ref().is_some_and(|which| which(&info));
+        let is_record = info.role == Role::Record;
         self.channels[at] = Some(Slot {
+            is_looked_at: is_record && !info.topic.starts_with("/in_flight/"),
             channel: info,
             is_passed_over,
         });
