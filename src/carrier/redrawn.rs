@@ -142,6 +142,9 @@ mod tests {
         sim.actor(a, "source", move |_| Source(sink));
         sim.link(a, b, "a-b", Comparing(ids.to_vec()));
         let report = sim.run(Executor::Inline).unwrap();
-        assert_eq!((report.end.name(), report.counts.delivered), ("completed", 5));
+        assert_eq!(
+            (report.end.name(), report.counts.delivered),
+            ("completed", 5)
+        );
     }
 }
