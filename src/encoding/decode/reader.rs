@@ -13,8 +13,6 @@ pub(super) struct Reader<'p, 'b> {
     bytes: &'b [u8],
     /// The offset of the next occurrence, while the bytes are in the flat schema's order.
     pos: usize,
-    /// What is there, once it is known: the field, where it ends and its value.
-    ahead: Option<(usize, usize, Payload<'b>)>,
     /// Otherwise: all occurrences as (field, offset), sorted, and how many were taken.
     sorted: Option<(Vec<(usize, usize)>, usize)>,
 }
@@ -33,7 +31,6 @@ impl<'p, 'b> Reader<'p, 'b> {
             depth,
             bytes,
             pos: 0,
-            ahead: None,
             sorted: None,
         };
         let (mut last, mut in_order) = (0, true);
@@ -87,9 +84,6 @@ impl<'p, 'b> Reader<'p, 'b> {
 
     /// Is there another occurrence of this field? Fields must be asked for in ascending order.
     pub(super) fn has(&mut self, index: usize) -> Result<bool, Fault> {
-        if self.sorted.is_none() {
-            return Ok(self.look(index)?.is_some());
-        }
         let (pos, sorted) = (self.pos, self.sorted.as_ref().map(|(_, taken)| *taken));
         let found = self.take(index)?.is_some();
         self.pos = pos;
@@ -97,30 +91,6 @@ impl<'p, 'b> Reader<'p, 'b> {
             *taken = before;
         }
         Ok(found)
-    }
-
-    /// What is next of this field, while the bytes are in order; fields before it are left behind.
-    #[inline]
-    fn look(&mut self, index: usize) -> Result<Option<(usize, Payload<'b>)>, Fault> {
-        loop {
-            let (found, end, payload) = match self.ahead {
-                Some(ahead) => ahead,
-                None => {
-                    let start = self.pos;
-                    let next = self.advance()?;
-                    let end = std::mem::replace(&mut self.pos, start);
-                    let Some((found, _, payload)) = next else {
-                        return Ok(None);
-                    };
-                    *self.ahead.insert((found, end, payload))
-                }
-            };
-            if found >= index {
-                return Ok((found == index).then_some((end, payload)));
-            }
-            self.pos = end;
-            self.ahead = None;
-        }
     }
 
     /// Takes the next occurrence of this field.
@@ -137,12 +107,17 @@ impl<'p, 'b> Reader<'p, 'b> {
             self.pos = at;
             return Ok(self.advance()?.map(|(_, _, payload)| payload));
         }
-        let Some((end, payload)) = self.look(index)? else {
-            return Ok(None);
-        };
-        self.pos = end;
-        self.ahead = None;
-        Ok(Some(payload))
+        loop {
+            let before = self.pos;
+            match self.advance()? {
+                Some((found, _, payload)) if found == index => return Ok(Some(payload)),
+                Some((found, _, _)) if found < index => {}
+                _ => {
+                    self.pos = before;
+                    return Ok(None);
+                }
+            }
+        }
     }
 
     /// Takes all occurrences of this field, of which the last counts.
@@ -156,7 +131,7 @@ impl<'p, 'b> Reader<'p, 'b> {
 
     /// Takes the last known field of all, in the order of the bytes.
     pub(super) fn take_any(&mut self) -> Result<Option<(usize, Payload<'b>)>, Fault> {
-        (self.pos, self.ahead) = (0, None);
+        self.pos = 0;
         let mut last = None;
         while let Some((index, _, payload)) = self.advance()? {
             last = Some((index, payload));
