@@ -27,6 +27,7 @@ fn hostile() -> Side {
         shown: 0,
         left_out: 0,
         notes: Vec::new(),
+        is_behind_its_end: false,
     }
 }
 
