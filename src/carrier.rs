@@ -1,6 +1,7 @@
 //! Links as the kernel sees them: a carrier is shown each message that one host sends to another,
 //! and decides its fate. What makes a radio a radio lives elsewhere; here is the contract.
 
+mod redrawn;
 mod ruled;
 
 use std::any::Any;
@@ -13,8 +14,11 @@ use crate::encoding::{EncodeError, Schema};
 use crate::ids::{EntityId, HostId, KindIndex, MatchKey};
 use crate::payload::{Encode, Message};
 use crate::random::RandomKey;
+use crate::ruling::MessageNumber;
 use crate::time::{SimDuration, SimTime};
 use crate::topology::{Kind, Topology};
+
+pub use redrawn::DrawsOf;
 
 /// A link: decides when each message arrives, how often, or why it does not.
 ///
@@ -157,11 +161,14 @@ impl Parcel<'_> {
     /// that matching messages of two runs meet the same luck.
     #[inline]
     pub fn random(&self, purpose: u64, attempt: u32, copy: u32) -> RandomKey {
-        let (identity, turn) = match self.match_key {
-            // Keeps a keyed message apart from an unkeyed one with an equal ordinal.
-            Some(key) => (key.bits(), u64::from(self.repeat) | 1 << 63),
-            None => (self.ordinal, 0),
+        let number = match self.match_key {
+            Some(key) => MessageNumber::Key {
+                key,
+                repeat: self.repeat,
+            },
+            None => MessageNumber::Ordinal(self.ordinal),
         };
+        let (identity, turn) = redrawn::identity(number);
         RandomKey::of([
             self.topology.seed,
             identity,
@@ -181,10 +188,8 @@ impl Parcel<'_> {
     /// number), where the number may be that of a slot of time. All messages that meet this slot
     /// then meet the same channel.
     pub fn random_at(&self, purpose: u64, number: u64) -> RandomKey {
-        RandomKey::new(self.topology.seed)
-            .number(self.topology.name_hash(self.link))
-            .number(purpose)
-            .number(number)
+        let link = self.topology.name_hash(self.link);
+        redrawn::at(self.topology.seed, link, purpose, number)
     }
 }
 

@@ -154,6 +154,8 @@ pub enum RulingEnd {
     WithoutEffect = 1,
     /// It changed what became of the message.
     Applied = 2,
+    /// It lost the message, and one that was declared later delivers it all the same; or the other way round.
+    Overruled = 3,
 }
 
 /// The rulings of a run.
@@ -204,18 +206,19 @@ impl Rulings {
         let end = |rule: &Rule| match rule.end.load(Ordering::Relaxed) {
             0 => RulingEnd::NeverMet,
             1 => RulingEnd::WithoutEffect,
-            _ => RulingEnd::Applied,
+            2 => RulingEnd::Applied,
+            _ => RulingEnd::Overruled,
         };
         self.rules.iter().map(end).collect()
     }
 
-    /// Those on a message.
-    pub(crate) fn on(&self, message: &MessageOf) -> impl Iterator<Item = &Rule> {
-        let places = self.by_message.get(message);
-        places
-            .into_iter()
-            .flatten()
-            .map(|place| &self.rules[*place as usize])
+    /// Those on a message, whichever of its names they use, in the order in which they were added.
+    pub(crate) fn on(&self, names: impl Iterator<Item = MessageOf>) -> Vec<&Rule> {
+        let places = names.filter_map(|name| self.by_message.get(&name));
+        let mut places: Vec<u32> = places.flatten().copied().collect();
+        places.sort_unstable();
+        let rule = |place: u32| &self.rules[place as usize];
+        places.into_iter().map(rule).collect()
     }
 }
 

@@ -58,6 +58,8 @@ pub(crate) struct KindEntry {
     pub(crate) type_id: TypeId,
     pub(crate) type_name: &'static str,
     pub(crate) trace: fn() -> Result<Schema, SchemaError>,
+    /// The same, without trying whether values come back.
+    pub(crate) trace_untried: fn() -> Result<Schema, SchemaError>,
 }
 
 impl KindEntry {
@@ -66,6 +68,7 @@ impl KindEntry {
             type_id: TypeId::of::<M>(),
             type_name: std::any::type_name::<M>(),
             trace: Schema::of::<M>,
+            trace_untried: Schema::untried::<M>,
         }
     }
 }

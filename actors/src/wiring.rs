@@ -102,6 +102,18 @@ impl Wiring {
             .iter()
             .map(move |&(from, to)| (host(from), host(to)))
     }
+
+    /// Of each wanted link, which one is the link back; none if none is wanted.
+    pub(crate) fn backs(&self) -> Vec<Option<usize>> {
+        let pairs = self.pairs.iter().enumerate();
+        let mut sorted: Vec<_> = pairs.map(|(at, pair)| (*pair, at)).collect();
+        sorted.sort_unstable();
+        let back = |&(from, to): &(usize, usize)| {
+            let found = sorted.binary_search_by_key(&(to, from), |(pair, _)| *pair);
+            found.ok().map(|found| sorted[found].1)
+        };
+        self.pairs.iter().map(back).collect()
+    }
 }
 
 /// Declares all links of a wiring. What a system is given that is put together without a scenario.
@@ -112,7 +124,9 @@ pub type Wire<'a> = dyn FnMut(&mut Simulation, &Wiring) -> Result<Links, LinkCon
 /// over here.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
-    nominal: BTreeMap<(String, String), Arc<LinkParams>>,
+    /// By name, the number of a host.
+    hosts: BTreeMap<String, usize>,
+    nominal: BTreeMap<(usize, usize), Arc<LinkParams>>,
     slowest: SimDuration,
     slowest_rate_bit_per_s: Option<u64>,
     processors: Processors,
@@ -157,10 +171,20 @@ impl Links {
         self.slowest_rate_bit_per_s = rates.into_iter().flatten().min();
     }
 
-    pub(crate) fn add(&mut self, from: &str, to: &str, nominal: Arc<LinkParams>) {
-        self.reckon(nominal.min_delay(), nominal.fastest_bit_per_s());
-        self.nominal
-            .insert((from.to_owned(), to.to_owned()), nominal);
+    /// What is known of the links of a wiring, from what each has.
+    fn of(wiring: &Wiring, nominal: impl Iterator<Item = Arc<LinkParams>>) -> Links {
+        let hosts = wiring.hosts.iter().enumerate();
+        let mut links = Links {
+            hosts: hosts.map(|(at, (_, name))| (name.clone(), at)).collect(),
+            ..Links::default()
+        };
+        let mut all = Vec::with_capacity(wiring.pairs.len());
+        for (pair, nominal) in wiring.pairs.iter().zip(nominal) {
+            links.reckon(nominal.min_delay(), nominal.fastest_bit_per_s());
+            all.push((*pair, nominal));
+        }
+        links.nominal = all.into_iter().collect();
+        links
     }
 
     /// What links and processors are told that has no effect, for people.
@@ -226,8 +250,8 @@ impl Links {
     /// Planners plan by this, and links act by the truth: a degradation is for the planner to find
     /// out. What is nominal does not change during a run.
     pub fn nominal(&self, from: &str, to: &str) -> Option<&LinkParams> {
-        let found = self.nominal.get(&(from.to_owned(), to.to_owned()));
-        found.map(Arc::as_ref)
+        let pair = (*self.hosts.get(from)?, *self.hosts.get(to)?);
+        self.nominal.get(&pair).map(Arc::as_ref)
     }
 
     /// The least time that a message takes over the slowest of the links, those through radios

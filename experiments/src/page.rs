@@ -17,8 +17,9 @@ mod tests;
 
 use std::path::Path;
 
+use farside::SimDuration;
 use farside_logs::{
-    AnyMessage, AnyMessages, DiffReport, Log, LogError, LogInfo, RecordRef, escaped,
+    AnyMessage, AnyMessages, DiffReport, Differing, Log, LogError, LogInfo, RecordRef, escaped,
 };
 use serde_json::{Value as Json, json};
 
@@ -33,6 +34,38 @@ const ROWS: usize = 2_200_000;
 /// Logs of up to so many messages are told to the nanosecond, larger ones to the microsecond.
 const EXACT: u64 = 250_000;
 
+/// The part of a run that a page shows, in nanoseconds since its start.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Window {
+    pub(crate) from_ns: u64,
+    pub(crate) until_ns: u64,
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Window {
+            from_ns: 0,
+            until_ns: u64::MAX,
+        }
+    }
+}
+
+impl Window {
+    /// What the page says of it; nothing of a whole run.
+    fn note(self) -> Option<String> {
+        let Window { from_ns, until_ns } = self;
+        let time = |ns| SimDuration::from_nanos(ns);
+        let span = match (from_ns, until_ns) {
+            (0, u64::MAX) => return None,
+            (from, u64::MAX) => format!("from {} on", time(from)),
+            (from, until) => format!("from {} to {}", time(from), time(until)),
+        };
+        Some(format!(
+            "The page shows the run {span}: what was before or after is not on it."
+        ))
+    }
+}
+
 /// A log as a page shows it.
 pub(crate) struct Side {
     head: Json,
@@ -46,30 +79,58 @@ pub(crate) struct Side {
     pub(crate) left_out: u64,
     /// What a reader should know of what the page does not have.
     pub(crate) notes: Vec<String>,
+    /// The time that it is to show begins behind the end of the log.
+    pub(crate) is_behind_its_end: bool,
 }
 
 /// What a log is read into.
-struct Reading {
+struct Reading<'a> {
     rows: Rows,
     map: Map,
     series: Series,
     /// Since when times count; a log of another program counts from its earliest message.
     start_ns: u64,
+    /// What is read of it. On the page times count from where it begins.
+    window: Window,
+    /// Which of the two logs of a comparison it is, and which messages differ.
+    marks: Option<(usize, &'a Differing)>,
     is_farside: bool,
     unreadable: u64,
     first_unreadable: String,
+    /// Something is as late as what is read begins.
+    reaches_window: bool,
 }
 
-/// Reads a log for a page that shows so many logs.
+/// Reads a log, or a part of it, for a page of one run.
 ///
 /// # Errors
 /// If it cannot be read, or is damaged before its end.
-pub(crate) fn read(path: &Path, logs: usize) -> Result<Side, LogError> {
+pub(crate) fn read(path: &Path, window: Window) -> Result<Side, LogError> {
+    read_for(path, window, None)
+}
+
+/// Reads one of two logs, the first (0) or the second (1), for a page of what differs between them.
+///
+/// # Errors
+/// Those of [`read`].
+pub(crate) fn read_beside(
+    path: &Path,
+    log: usize,
+    differing: &Differing,
+) -> Result<Side, LogError> {
+    read_for(path, Window::default(), Some((log, differing)))
+}
+
+fn read_for(
+    path: &Path,
+    window: Window,
+    marks: Option<(usize, &Differing)>,
+) -> Result<Side, LogError> {
     // Said of what is no MCAP file before anything else.
     let mut messages = AnyMessages::open(path, &[])?;
     let info = farside_logs::info(path)?;
     let start_ns = Log::open(path).ok().map(|log| log.epoch_ns());
-    let logs = logs.max(1);
+    let logs = 1 + usize::from(marks.is_some());
     let bounds = Bounds {
         rows: ROWS / logs,
         more: ROWS / logs / 8,
@@ -82,8 +143,11 @@ pub(crate) fn read(path: &Path, logs: usize) -> Result<Side, LogError> {
         is_farside: start_ns.is_some(),
         // Messages may be in any order: time begins with the earliest.
         start_ns: start_ns.or(info.start_ns).unwrap_or(0),
+        window,
+        marks,
         unreadable: 0,
         first_unreadable: String::new(),
+        reaches_window: false,
     };
     while let Some(message) = messages.next()? {
         reading.add(&message);
@@ -92,9 +156,16 @@ pub(crate) fn read(path: &Path, logs: usize) -> Result<Side, LogError> {
     Ok(reading.finish(path, &info, cut))
 }
 
-impl Reading {
+impl Reading<'_> {
     fn add(&mut self, message: &AnyMessage<'_>) {
+        let Window { from_ns, until_ns } = self.window;
         let at_ns = message.log_time_ns().saturating_sub(self.start_ns);
+        if at_ns > until_ns {
+            return;
+        }
+        let is_before = at_ns < from_ns;
+        self.reaches_window |= !is_before;
+        let at_ns = at_ns.saturating_sub(from_ns);
         self.rows.reaches(at_ns);
         let channel = message.channel();
         let schema = channel.schema.as_ref().map_or("", |schema| &schema.name);
@@ -104,13 +175,22 @@ impl Reading {
                 Err(error) => self.miss(message, &error.to_string()),
             }
         }
+        // Where things stand as the page begins is seen on its map; nothing else is of what was before.
+        if is_before {
+            return;
+        }
         if !self.is_farside {
             return self.add_foreign(message, schema, at_ns);
         }
         match channel.role() {
             "message" | "event" => match message.record() {
                 Some(record) => {
-                    let happened = Happened::of(&record, at_ns);
+                    let from_ns = self.window.from_ns;
+                    let differs = self.differs(message);
+                    let happened = Happened {
+                        differs,
+                        ..Happened::of(&record, at_ns, from_ns)
+                    };
                     self.rows.add(&happened, || said(message, &record));
                 }
                 None => self.miss(message, "malformed"),
@@ -137,7 +217,8 @@ impl Reading {
         }
         let published = message.publish_time_ns();
         // What was published before the first message was logged is drawn from there.
-        let sent_ns = published.saturating_sub(self.start_ns).min(at_ns);
+        let begin_ns = self.start_ns.saturating_add(self.window.from_ns);
+        let sent_ns = published.saturating_sub(begin_ns).min(at_ns);
         let topic = escaped(message.topic());
         let happened = Happened {
             class: "message",
@@ -152,12 +233,18 @@ impl Reading {
             sent_ns,
             key: None,
             cause: None,
+            differs: self.differs(message),
         };
         let said = || match &value {
             Ok(value) => value.to_string(),
             Err(error) => format!("{} bytes: {error}", message.data().len()),
         };
         self.rows.add(&happened, said);
+    }
+
+    fn differs(&self, message: &AnyMessage<'_>) -> bool {
+        let marks = self.marks;
+        marks.is_some_and(|(log, differing)| differing.has(log, message))
     }
 
     fn miss(&mut self, message: &AnyMessage<'_>, why: &str) {
@@ -169,8 +256,10 @@ impl Reading {
 
     fn finish(mut self, path: &Path, info: &LogInfo, cut: Option<String>) -> Side {
         let mut notes: Vec<String> = Vec::new();
-        notes.extend(cut.map(|cut| format!("The log is {cut}.")));
-        let missing = info.missing.iter().filter(|_| notes.is_empty());
+        notes.extend(self.window.note());
+        notes.extend(cut.as_ref().map(|cut| format!("The log is {cut}.")));
+        let is_cut = cut.is_some();
+        let missing = info.missing.iter().filter(|_| !is_cut);
         let missing: Vec<String> = missing.map(|missing| escaped(missing)).collect();
         notes.extend(missing);
         if self.unreadable > 0 {
@@ -194,6 +283,7 @@ impl Reading {
             "facts": facts(info),
             "scenario": info.run.as_ref().map(|run| escaped(&run.scenario)),
             "notes": notes,
+            "from_ns": self.window.from_ns,
             "told": self.rows.told(),
         });
         Side {
@@ -205,6 +295,7 @@ impl Reading {
             shown,
             left_out,
             notes,
+            is_behind_its_end: self.window.from_ns > 0 && !self.reaches_window,
         }
     }
 }

@@ -22,10 +22,11 @@ mod without_run;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use farside::suggest::nearest;
 use farside::{End, Report, SimDuration, SimTime, Simulation};
-use farside_actors::link::{Degrade, LinksConfig};
+use farside_actors::link::{Degrade, LinksConfig, Timeline};
 use farside_actors::radio::RadioConfig;
 use farside_actors::system::{Assembly, Files, Seeds, Settings, Setup, SetupError};
 use farside_actors::wiring::LinkBuilder;
@@ -415,6 +416,20 @@ impl Scenario {
             remarks,
             planned,
         })
+    }
+
+    /// What the link from one host to another has when.
+    ///
+    /// # Errors
+    /// When links make no sense, or a file cannot be read.
+    pub(crate) fn link_between(
+        &self,
+        from: &str,
+        to: &str,
+    ) -> Result<Arc<Timeline>, ScenarioError> {
+        let declared = self.links(&mut self.files.clone());
+        let declared = declared.map_err(|error| ScenarioError::from_setup(&self.source, error));
+        Ok(declared?.links.between(from, to))
     }
 
     /// The links as the scenario has them, before hosts are known.

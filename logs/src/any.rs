@@ -9,7 +9,7 @@ use crate::LogError;
 use crate::channel::ChannelInfo;
 use crate::envelope::RecordRef;
 use crate::fields;
-use crate::scan::{Item, ScannedMessage, Scanner};
+use crate::scan::{Item, Position, ScannedMessage, Scanner};
 use crate::topics::Topics;
 use crate::value::Unreadable;
 use crate::value::Value;
@@ -29,6 +29,10 @@ impl<'a> AnyMessage<'a> {
     /// Its channel: encoding, schema, metadata.
     pub fn channel(&self) -> &'a ChannelInfo {
         self.message.channel
+    }
+
+    pub(crate) fn position(&self) -> Position {
+        self.message.position
     }
 
     /// When it was logged, in nanoseconds since whatever the log counts from.

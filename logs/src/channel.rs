@@ -92,6 +92,13 @@ impl ChannelInfo {
         self.metadata.get("role").map_or("", String::as_str)
     }
 
+    /// Whose state samples the channel has, if it has any.
+    pub(crate) fn sampled(&self) -> &str {
+        let topic = self.topic.as_str();
+        let inner = topic.strip_prefix("/state/").unwrap_or(topic);
+        inner.rsplit_once('/').map_or("", |(sender, _)| sender)
+    }
+
     pub(crate) fn says_the_same(&self, other: &ChannelRecord<'_>) -> bool {
         self.schema_id == other.schema_id
             && self.topic == other.topic

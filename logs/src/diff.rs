@@ -8,6 +8,7 @@ mod causal;
 mod chain;
 mod comparison;
 mod detail;
+mod differing;
 mod entry;
 mod found;
 mod index;
@@ -33,6 +34,7 @@ use serde::Serialize;
 use crate::LogError;
 use crate::fields::{Rules, Tolerance};
 pub use chain::{CauseChain, CausedBy, causes};
+pub use differing::Differing;
 
 /// How two logs are compared.
 ///
@@ -217,6 +219,9 @@ pub struct Root {
     /// Of a link's decision: what is known of the draw behind it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub draw: Option<String>,
+    /// Of a loss by chance: its reason.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_chance: Option<String>,
     /// Of something planned: how much else that was planned for that time differs.
     #[serde(skip_serializing_if = "is_zero")]
     pub more: u64,
@@ -379,10 +384,38 @@ pub fn diff(
     options: &DiffOptions,
 ) -> Result<DiffReport, LogError> {
     let limits = Limits::default();
-    Ok(comparison::compare(a.as_ref(), b.as_ref(), options, limits)?.0)
+    Ok(comparison::compare(a.as_ref(), b.as_ref(), options, limits, None)?.0)
 }
 
-/// How a comparison goes about it: changes its speed and its memory, never what it finds.
+/// Compares two logs as [`diff`] does, and says of each message whether it differs.
+///
+/// ```no_run
+/// let (report, differing) = farside_logs::diff_marked("a.mcap", "b.mcap", &Default::default())?;
+/// let mut messages = farside_logs::AnyMessages::open("a.mcap", &[])?;
+/// let mut count = 0;
+/// while let Some(message) = messages.next()? {
+///     count += u64::from(differing.has(0, &message));
+/// }
+/// println!("{count} of a.mcap, {} in both changed", report.changed);
+/// # Ok::<(), farside_logs::LogError>(())
+/// ```
+///
+/// # Errors
+/// Those of [`diff`].
+pub fn diff_marked(
+    a: impl AsRef<Path>,
+    b: impl AsRef<Path>,
+    options: &DiffOptions,
+) -> Result<(DiffReport, Differing), LogError> {
+    let mut differing = Differing::default();
+    let limits = Limits::default();
+    let marks = Some(&mut differing);
+    let (report, _) = comparison::compare(a.as_ref(), b.as_ref(), options, limits, marks)?;
+    differing.sort();
+    Ok((report, differing))
+}
+
+/// How a comparison goes about it: changes its speed and its memory, but for one never what it finds.
 #[derive(Clone, Copy)]
 pub(crate) struct Limits {
     /// How many entries of each log may be in memory.
@@ -393,6 +426,9 @@ pub(crate) struct Limits {
     message_bytes: usize,
     /// Whether the front of both is passed over as long as it agrees.
     passes_front: bool,
+    /// How many messages are kept in mind that have another place in their flow in the other log. With more
+    /// than these a message may be paired with another one, and the report says so.
+    shifted: usize,
 }
 
 impl Limits {
@@ -409,6 +445,7 @@ impl Default for Limits {
             pairs: 64 << 10,
             message_bytes: 64 << 20,
             passes_front: true,
+            shifted: 256 << 10,
         }
     }
 }

@@ -251,10 +251,11 @@ impl Frames {
 }
 
 /// Takes the opcode and the length in front of a record apart.
+#[inline]
 pub(crate) fn record_head(bytes: &[u8]) -> Option<(u8, u64)> {
     let (opcode, length) = bytes.split_first()?;
-    let length = length.get(..8)?.try_into().ok()?;
-    Some((*opcode, u64::from_le_bytes(length)))
+    let length = length.first_chunk()?;
+    Some((*opcode, u64::from_le_bytes(*length)))
 }
 
 /// Records of which nothing is needed: indices, and whatever a later version of MCAP may add.

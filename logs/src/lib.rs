@@ -87,8 +87,8 @@ mod writer;
 pub use any::{AnyMessage, AnyMessages};
 pub use channel::{ChannelInfo, SchemaInfo};
 pub use diff::{
-    Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FieldChange, FirstDifference,
-    Rate, Reached, TopicDiff, causes, diff,
+    Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, Differing, FieldChange,
+    FirstDifference, Hop, Rate, Reached, Root, RootKind, TopicDiff, causes, diff, diff_marked,
 };
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;

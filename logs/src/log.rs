@@ -10,7 +10,7 @@ use crate::LogError;
 use crate::channel::{ChannelInfo, Role};
 use crate::envelope::{CheckpointRef, KeyRef, RecordRef};
 use crate::frames::{HEAD_BYTES, LIMIT_BYTES};
-use crate::scan::{Item, ScannedMessage, Scanner};
+use crate::scan::{Item, Position, ScannedMessage, Scanner};
 use crate::source::{Attached, Sum};
 use crate::writer::{Attachment, FORMAT_MAJOR, FORMAT_MINOR, SCENARIO_ATTACHMENT};
 
@@ -98,7 +98,7 @@ impl Log {
     /// Reads the start of a log, and those of its attachments that are `wanted` by name.
     pub(crate) fn read(path: &Path, wanted: fn(&str) -> bool) -> Result<Log, LogError> {
         let path = path.to_owned();
-        let mut scanner = Scanner::open(&path)?;
+        let mut scanner = Scanner::outside_chunks(&path)?;
         let mut metadata = BTreeMap::new();
         let mut attached = Vec::new();
         while let Some(item) = scanner.next()? {
@@ -192,8 +192,18 @@ impl Log {
 
     /// The records, from the first one on.
     pub fn records(&self) -> Result<Records, LogError> {
+        self.records_but(|_| false)
+    }
+
+    /// The records, but for those of some channels.
+    pub(crate) fn records_but(
+        &self,
+        which: impl Fn(&ChannelInfo) -> bool + Send + 'static,
+    ) -> Result<Records, LogError> {
+        let mut scanner = Scanner::open(&self.path)?;
+        scanner.pass_over(move |channel| channel.role == Role::Other || which(channel));
         Ok(Records {
-            scanner: Scanner::open(&self.path)?,
+            scanner,
             epoch_ns: self.head.epoch_ns,
             ending: Ending::default(),
         })
@@ -303,6 +313,26 @@ impl Records {
         self.scanner.current().ok_or_else(gone)
     }
 
+    /// Passes over records by what they say; see [`Records::passed`].
+    pub(crate) fn pass_over(&mut self, which: impl Fn(&[u8]) -> bool + Send + 'static) {
+        self.scanner.pass_over_records(which);
+    }
+
+    /// When the last record is that was passed over, where, and on which channel.
+    pub(crate) fn passed(&self) -> Option<(u64, Position, u32)> {
+        let (head, position, serial) = self.scanner.passed()?;
+        Some((head.log_time, position, serial))
+    }
+
+    /// A message that was read before, with the serial number of its channel.
+    pub(crate) fn message_at(
+        &mut self,
+        position: Position,
+        serial: u32,
+    ) -> Result<ScannedMessage<'_>, LogError> {
+        self.scanner.message_at(position, serial)
+    }
+
     /// The record that [`Records::step`] came to.
     pub(crate) fn record(&self) -> Result<(RecordRef<'_>, ScannedMessage<'_>), LogError> {
         let message = self.message()?;
@@ -341,9 +371,7 @@ impl Records {
     /// The state sample that [`Records::step`] came to, as a record.
     pub(crate) fn sample(&self) -> Result<(RecordRef<'_>, &ChannelInfo), LogError> {
         let message = self.message()?;
-        let topic = message.channel.topic.as_str();
-        let inner = topic.strip_prefix("/state/").unwrap_or(topic);
-        let sender = inner.rsplit_once('/').map_or("", |(sender, _)| sender);
+        let sender = message.channel.sampled();
         let time_ns = message.head.log_time.saturating_sub(self.epoch_ns);
         let record = RecordRef {
             class: RecordClass::Sample,

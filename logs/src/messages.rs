@@ -6,7 +6,7 @@ use std::path::Path;
 use farside::record::RecordClass;
 use farside::ruling::{MessageId, MessageNumber};
 use farside::suggest::nearest;
-use farside::{MatchKey, SimTime};
+use farside::{Carriage, MatchKey, SimTime};
 
 use crate::LogError;
 use crate::log::Log;
@@ -24,13 +24,23 @@ pub struct FoundMessage {
     pub class: RecordClass,
     /// When.
     pub at: SimTime,
+    /// Why it was lost; empty if it was not.
+    pub reason: String,
+    /// The protocol's own identity for the message, if it gave one.
+    pub match_key: Option<MatchKey>,
+    /// How many messages right before it in the flow had the same key; none if the log lacks those.
+    pub repeat: Option<u32>,
+    /// How its link carried it, where the link says.
+    pub carriage: Option<Carriage>,
+    /// The size of the encoded message in bytes.
+    pub bytes: u64,
 }
 
 /// A copy of a message of a flow.
 struct Copy {
-    ordinal: u64,
     copy: u32,
-    key: Option<MatchKey>,
+    /// How many right before have its key, of those that are there.
+    repeats: u32,
     found: FoundMessage,
 }
 
@@ -68,22 +78,27 @@ pub fn find_messages(
         let name = [record.sender, record.receiver, record.kind].map(str::to_owned);
         if let Some(copies) = flows.get_mut(&name) {
             copies.push(Copy {
-                ordinal: record.ordinal,
                 copy: record.copy,
-                key: record.match_key.map(MatchKey::from_bits),
+                repeats: 0,
                 found: FoundMessage {
                     ordinal: record.ordinal,
                     sent: SimTime::from_nanos(record.sent_ns),
                     link: (!record.link.is_empty()).then(|| record.link.to_owned()),
                     class: record.class,
                     at: SimTime::from_nanos(record.key.time_ns),
+                    reason: record.reason.to_owned(),
+                    match_key: record.match_key.map(MatchKey::from_bits),
+                    repeat: None,
+                    carriage: record.carriage,
+                    bytes: record.body.len() as u64,
                 },
             });
         }
         *known.entry(name).or_default() += 1;
     }
     for copies in flows.values_mut() {
-        copies.sort_by_key(|copy| (copy.ordinal, copy.copy));
+        copies.sort_by_key(|copy| (copy.found.ordinal, copy.copy));
+        count_repeats(copies);
     }
     let find = |id: &MessageId| {
         let copies = &flows[&flow(id)];
@@ -98,27 +113,37 @@ fn flow(id: &MessageId) -> [String; 3] {
     [&id.sender, &id.receiver, &id.kind].map(Clone::clone)
 }
 
+/// Counts how many messages right before each have its key; what is counted is sure if the log has the flow from its
+/// first message, or from one with another key, on.
+fn count_repeats(copies: &mut [Copy]) {
+    let mut before: Option<(FoundMessage, u32)> = None;
+    for Copy { found, repeats, .. } in copies {
+        let is_next = |last: &FoundMessage| last.ordinal + 1 == found.ordinal;
+        (*repeats, found.repeat) = match &before {
+            Some((last, repeats)) if last.ordinal == found.ordinal => (*repeats, last.repeat),
+            Some((last, repeats)) if last.match_key == found.match_key => {
+                let sure = last.repeat.filter(|_| is_next(last));
+                (repeats + 1, sure.map(|sure| sure + 1))
+            }
+            Some((last, _)) => (0, is_next(last).then_some(0)),
+            None => (0, (found.ordinal == 0).then_some(0)),
+        };
+        before = Some((found.clone(), *repeats));
+    }
+}
+
 /// The copies of a message, from those of its flow in order.
 fn numbered(copies: &[Copy], number: MessageNumber) -> impl Iterator<Item = &Copy> {
-    let ordinal = match number {
-        MessageNumber::Ordinal(ordinal) => Some(ordinal),
+    let is_it = move |copy: &&Copy| match number {
+        MessageNumber::Ordinal(ordinal) => copy.found.ordinal == ordinal,
         MessageNumber::Key { key, repeat } => {
-            let mut before: Option<(u64, Option<MatchKey>, u32)> = None;
-            copies.iter().find_map(|copy| {
-                let repeats = match before {
-                    Some((ordinal, _, repeats)) if ordinal == copy.ordinal => repeats,
-                    Some((_, last, repeats)) if last == copy.key => repeats + 1,
-                    _ => 0,
-                };
-                before = Some((copy.ordinal, copy.key, repeats));
-                let is_it = copy.key == Some(key) && repeats == repeat;
-                is_it.then_some(copy.ordinal)
-            })
+            copy.found.match_key == Some(key) && copy.repeats == repeat
         }
     };
+    let ordinal = copies.iter().find(is_it).map(|copy| copy.found.ordinal);
     copies
         .iter()
-        .filter(move |copy| Some(copy.ordinal) == ordinal)
+        .filter(move |copy| Some(copy.found.ordinal) == ordinal)
 }
 
 /// Why a message is not found.
@@ -133,7 +158,7 @@ fn missing(
         topics => format!("; topics that were not written: {}", topics.join(", ")),
     };
     if let (Some(first), Some(last)) = (copies.first(), copies.last()) {
-        let (first, last) = (first.ordinal, last.ordinal);
+        let (first, last) = (first.found.ordinal, last.found.ordinal);
         let flow = flow(id).join(",");
         return format!("{id}: the log has {flow} from number {first} to {last} only{filtered}");
     }

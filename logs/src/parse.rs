@@ -23,6 +23,7 @@ impl<'a> Parser<'a> {
         self.rest
     }
 
+    #[inline]
     pub(crate) fn bytes(&mut self, length: u64) -> Option<&'a [u8]> {
         let length = usize::try_from(length).ok()?;
         let (taken, rest) = self.rest.split_at_checked(length)?;
@@ -30,24 +31,29 @@ impl<'a> Parser<'a> {
         Some(taken)
     }
 
+    #[inline]
     fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
         let (taken, rest) = self.rest.split_first_chunk::<N>()?;
         self.rest = rest;
         Some(*taken)
     }
 
+    #[inline]
     pub(crate) fn u8(&mut self) -> Option<u8> {
         self.array::<1>().map(|[byte]| byte)
     }
 
+    #[inline]
     pub(crate) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
+    #[inline]
     pub(crate) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
+    #[inline]
     pub(crate) fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
@@ -117,6 +123,7 @@ impl<'a> ChannelRecord<'a> {
 pub(crate) const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// Takes the head of a message record apart.
+#[inline]
 pub(crate) fn message_header(content: &[u8]) -> Option<MessageHeader> {
     let mut parser = Parser::new(content);
     Some(MessageHeader {

@@ -10,17 +10,17 @@ use farside::key::EventKey;
 use farside::record::RecordClass;
 use farside::replay::{Charge, ChargedMessage, OutputClass, RecordEnd, Recorded, Replay};
 use farside::{EntityId, MatchKey, RunInfo, SimTime};
-use hashbrown::HashSet;
+use hashbrown::HashMap;
 use rustc_hash::FxBuildHasher;
 
 pub use again::{Again, again};
 pub use told::{OutputCount, OutputSide, ReplayOutcome, ReplayedOutput, ReplayedStep};
 
 use crate::LogError;
-use crate::channel::SchemaInfo;
+use crate::channel::{ChannelInfo, Role, SchemaInfo};
 use crate::envelope::{KeyRef, RecordRef};
-use crate::log::{Ending, Log, Step};
-use crate::scan::ScannedMessage;
+use crate::log::{Log, Records, Step};
+use crate::scan::{Position, ScannedMessage};
 use crate::topics::{Topics, topic_before_1_3, topic_of};
 use told::Schemas;
 
@@ -58,13 +58,15 @@ pub fn replay(
         replay.charge(charge);
     }
     let info = replay.info().clone();
-    let names = Names::of(&replay);
+    let names = Arc::new(Names::of(&replay));
     let live = accepted(&replay);
     let wrong = |reason: String| LogError::Replay {
         path: log.path().to_owned(),
         reason,
     };
-    let mut records = log.records()?;
+    let mut records = log.records_but(names.far_samples())?;
+    let concerning = names.clone();
+    records.pass_over(move |envelope| !concerning.concern(envelope));
     let mut schemas: BTreeMap<String, Arc<SchemaInfo>> = BTreeMap::new();
     let mut last = Last::default();
     loop {
@@ -73,15 +75,12 @@ pub fn replay(
             Step::Checkpoint => {}
             Step::Sample => {
                 let (record, channel) = records.sample()?;
-                if !names.near.contains(record.sender.as_bytes()) {
-                    continue;
-                }
                 if let Some(schema) = &channel.schema
                     && !schemas.contains_key(record.kind)
                 {
                     schemas.insert(record.kind.to_owned(), schema.clone());
                 }
-                if let Some(actor) = info.entity(record.sender) {
+                if let Some(actor) = names.entity(record.sender) {
                     let fed = replay.feed(&sampled(&record, actor));
                     fed.map_err(|error| wrong(error.to_string()))?;
                 }
@@ -89,18 +88,21 @@ pub fn replay(
             Step::Record => {
                 let message = records.message()?;
                 last.meet(&message);
+                // Messages outside chunks, and what was in flight, are not passed over.
                 if !names.concern(message.data) {
                     continue;
                 }
                 let (record, _) = records.record()?;
-                let read = recorded(&record, &info).map_err(&wrong)?;
+                let read = names.recorded(&record).map_err(&wrong)?;
                 let fed = replay.feed(&read);
                 fed.map_err(|error| wrong(error.to_string()))?;
             }
         }
     }
+    last.pass(records.passed());
+    let end = last.end_of(&mut records, log.head().epoch_ns, &names)?;
+    let report = replay.finish(end);
     let ending = records.ending();
-    let report = replay.finish(last.end_of(ending, log.head().epoch_ns, &info));
     let mut outcome = ReplayOutcome::of(
         &report,
         &Schemas {
@@ -116,57 +118,109 @@ pub fn replay(
     Ok(outcome)
 }
 
-/// The last record but for messages in flight, unread.
+/// Where the last record is, but for messages in flight.
 #[derive(Default)]
 struct Last {
     log_time: u64,
-    envelope: Vec<u8>,
+    place: Option<(Position, u32)>,
 }
 
 impl Last {
     fn meet(&mut self, message: &ScannedMessage<'_>) {
         self.log_time = message.head.log_time;
         if !message.channel.topic.starts_with("/in_flight/") {
-            self.envelope.clear();
-            self.envelope.extend_from_slice(message.data);
+            self.place = Some((message.position, message.channel.serial));
+        }
+    }
+
+    /// Of what was passed over the last record.
+    fn pass(&mut self, passed: Option<(u64, Position, u32)>) {
+        let Some((log_time, position, serial)) = passed else {
+            return;
+        };
+        self.log_time = self.log_time.max(log_time);
+        if self.place.is_none_or(|(known, _)| known < position) {
+            self.place = Some((position, serial));
         }
     }
 
     /// How the record ends, as the replay wants to know it.
-    fn end_of(&self, ending: &Ending, epoch_ns: u64, info: &RunInfo) -> RecordEnd {
-        let last = RecordRef::read(&self.envelope);
-        let last = last
-            .and_then(|last| recorded(&last, info).ok())
-            .map(|last| last.key);
+    fn end_of(
+        &self,
+        records: &mut Records,
+        epoch_ns: u64,
+        names: &Names,
+    ) -> Result<RecordEnd, LogError> {
+        let ending = records.ending();
         let logged = SimTime::from_nanos(self.log_time.saturating_sub(epoch_ns));
         let at = ending.text("end_time_ns").and_then(|at| at.parse().ok());
         let at = at.map_or(logged, SimTime::from_nanos);
-        match ending.text("end").filter(|_| ending.cut.is_none()) {
-            Some("completed") => RecordEnd::Completed { at },
-            Some("stopped") => RecordEnd::Stopped { at },
-            Some("fault") => RecordEnd::Fault {
-                at,
-                text: ending.text("end_detail").unwrap_or_default().to_owned(),
-                last,
-            },
-            _ => RecordEnd::Cut { at: logged, last },
-        }
+        let text = match ending.text("end").filter(|_| ending.cut.is_none()) {
+            Some("completed") => return Ok(RecordEnd::Completed { at }),
+            Some("stopped") => return Ok(RecordEnd::Stopped { at }),
+            Some("fault") => Some(ending.text("end_detail").unwrap_or_default().to_owned()),
+            _ => None,
+        };
+        let last = match self.place {
+            Some((position, serial)) => {
+                let message = records.message_at(position, serial)?;
+                let last = RecordRef::read(message.data);
+                let last = last.and_then(|last| names.recorded(&last).ok());
+                last.map(|last| last.key)
+            }
+            None => None,
+        };
+        Ok(match text {
+            Some(text) => RecordEnd::Fault { at, text, last },
+            None => RecordEnd::Cut { at: logged, last },
+        })
     }
 }
 
-/// Whose records matter, by the bytes of their names: most records are passed over by these alone.
+/// The entities of the simulation by name, and whose records matter: most are passed over by their first bytes.
 struct Names {
-    near: HashSet<Box<[u8]>, FxBuildHasher>,
+    info: Arc<RunInfo>,
+    numbers: HashMap<Box<str>, EntityId, FxBuildHasher>,
+    /// By entity.
+    is_near: Vec<bool>,
+    /// By length, which last bytes the names of the near ones have: few others share both.
+    ends: Vec<[u64; 4]>,
 }
 
 impl Names {
     fn of(replay: &Replay) -> Self {
-        let entities = replay.info().entities.iter().enumerate();
-        let near = entities.filter(|(at, _)| replay.is_near(EntityId::from_index(*at)));
-        let near = near.map(|(_, entity)| Box::from(entity.name.as_bytes()));
-        Names {
-            near: near.collect(),
+        let info = replay.info().clone();
+        let entities = || (0..info.entities.len()).map(EntityId::from_index);
+        let is_near: Vec<bool> = entities().map(|entity| replay.is_near(entity)).collect();
+        let mut ends = vec![[0; 4]; 0x80];
+        for entity in entities().filter(|entity| is_near[entity.index()]) {
+            let name = info.name(entity).as_bytes();
+            if let (Some(of_length), Some(&end)) = (ends.get_mut(name.len()), name.last()) {
+                of_length[usize::from(end >> 6)] |= 1 << (end & 63);
+            }
         }
+        let numbers = entities().map(|entity| (Box::from(info.name(entity)), entity));
+        Names {
+            numbers: numbers.collect(),
+            is_near,
+            ends,
+            info,
+        }
+    }
+
+    fn entity(&self, name: &str) -> Option<EntityId> {
+        self.numbers.get(name).copied()
+    }
+
+    fn is_near(&self, name: &[u8]) -> bool {
+        if let (Some(of_length), Some(&end)) = (self.ends.get(name.len()), name.last())
+            && of_length[usize::from(end >> 6)] >> (end & 63) & 1 == 0
+        {
+            return false;
+        }
+        let entity = std::str::from_utf8(name).ok();
+        let entity = entity.and_then(|name| self.entity(name));
+        entity.is_some_and(|entity| self.is_near[entity.index()])
     }
 
     /// Whether an envelope may be of something that concerns the living.
@@ -178,7 +232,61 @@ impl Names {
         let Some((receiver, _)) = short_text(rest, 2) else {
             return true;
         };
-        receiver == b"@control" || self.near.contains(receiver) || self.near.contains(sender)
+        self.is_near(receiver) || self.is_near(sender) || receiver == b"@control"
+    }
+
+    /// Tells the channels of state samples of actors that are not near.
+    fn far_samples(&self) -> impl Fn(&ChannelInfo) -> bool + Send + 'static {
+        let near = self.is_near.iter().zip(&self.info.entities);
+        let near = near.filter(|(is_near, _)| **is_near);
+        let near: Vec<String> = near.map(|(_, entity)| entity.name.clone()).collect();
+        move |channel| {
+            channel.role == Role::Sample && near.iter().all(|near| near != channel.sampled())
+        }
+    }
+
+    /// A record with names for numbers.
+    fn recorded<'a>(&self, record: &RecordRef<'a>) -> Result<Recorded<'a>, String> {
+        let entity = |name: &str| {
+            let found = self.entity(name);
+            found.ok_or_else(|| {
+                let names = self.info.entities.iter().map(|entity| entity.name.as_str());
+                let close = farside::suggest::nearest(name, names);
+                let hint = farside::suggest::did_you_mean(close.as_deref());
+                format!("it names {name:?}, which the simulation does not have{hint}")
+            })
+        };
+        let key = |key: &KeyRef<'_>| {
+            Ok::<_, String>(EventKey {
+                time: SimTime::from_nanos(key.time_ns),
+                step: key.step,
+                tie: key.tie,
+                source: entity(key.source)?,
+                count: key.count,
+            })
+        };
+        Ok(Recorded {
+            class: record.class,
+            key: key(&record.key)?,
+            cause: record.cause.as_ref().map(key).transpose()?,
+            sender: entity(record.sender)?,
+            receiver: entity(record.receiver)?,
+            link: match record.link {
+                "" => None,
+                link => Some(entity(link)?),
+            },
+            kind: record.kind,
+            ordinal: record.ordinal,
+            copy: record.copy,
+            match_key: record.match_key.map(MatchKey::from_bits),
+            sent: SimTime::from_nanos(record.sent_ns),
+            reason: record.reason,
+            body: match record.class {
+                RecordClass::Stop => record.note.as_bytes(),
+                _ => record.body,
+            },
+            carriage: record.carriage,
+        })
     }
 }
 
@@ -188,50 +296,6 @@ fn short_text(envelope: &[u8], field: u8) -> Option<(&[u8], &[u8])> {
     let (&[tag, len], rest) = envelope.split_first_chunk()?;
     let is_it = tag == field << 3 | TEXT && len < 0x80;
     rest.split_at_checked(len.into()).filter(|_| is_it)
-}
-
-/// A record with names for numbers.
-fn recorded<'a>(record: &RecordRef<'a>, info: &RunInfo) -> Result<Recorded<'a>, String> {
-    let entity = |name: &str| {
-        let found = info.entity(name);
-        found.ok_or_else(|| {
-            let names = info.entities.iter().map(|entity| entity.name.as_str());
-            let close = farside::suggest::nearest(name, names);
-            let hint = farside::suggest::did_you_mean(close.as_deref());
-            format!("it names {name:?}, which the simulation does not have{hint}")
-        })
-    };
-    let key = |key: &KeyRef<'_>| {
-        Ok::<_, String>(EventKey {
-            time: SimTime::from_nanos(key.time_ns),
-            step: key.step,
-            tie: key.tie,
-            source: entity(key.source)?,
-            count: key.count,
-        })
-    };
-    Ok(Recorded {
-        class: record.class,
-        key: key(&record.key)?,
-        cause: record.cause.as_ref().map(key).transpose()?,
-        sender: entity(record.sender)?,
-        receiver: entity(record.receiver)?,
-        link: match record.link {
-            "" => None,
-            link => Some(entity(link)?),
-        },
-        kind: record.kind,
-        ordinal: record.ordinal,
-        copy: record.copy,
-        match_key: record.match_key.map(MatchKey::from_bits),
-        sent: SimTime::from_nanos(record.sent_ns),
-        reason: record.reason,
-        body: match record.class {
-            RecordClass::Stop => record.note.as_bytes(),
-            _ => record.body,
-        },
-        carriage: record.carriage,
-    })
 }
 
 /// A state sample of an actor.
@@ -415,7 +479,7 @@ pub fn charges_in(log: &Log, replay: &Replay) -> Result<Option<Vec<Charge>>, Log
         return Ok(None);
     }
     let (info, names) = (replay.info(), Names::of(replay));
-    let mut records = log.records()?;
+    let mut records = log.records_but(|channel| channel.role == Role::Sample)?;
     let mut charges = Vec::new();
     loop {
         match records.step()? {
@@ -430,11 +494,11 @@ pub fn charges_in(log: &Log, replay: &Replay) -> Result<Option<Vec<Charge>>, Log
         // How a message is carried that is still on its way is not in the log.
         let is_under_way = record.class == RecordClass::InFlight
             && !record.link.is_empty()
-            && names.near.contains(record.sender.as_bytes());
+            && names.is_near(record.sender.as_bytes());
         let is_silent = record.class.is_fate()
             && record.carriage.is_none()
             && !record.link.is_empty()
-            && names.near.contains(record.sender.as_bytes());
+            && names.is_near(record.sender.as_bytes());
         if record.class == RecordClass::HandOver || is_under_way || is_silent {
             return Ok(None);
         }
@@ -442,7 +506,7 @@ pub fn charges_in(log: &Log, replay: &Replay) -> Result<Option<Vec<Charge>>, Log
         if !record.class.is_fate() || energy_j == 0.0 {
             continue;
         }
-        let read = recorded(&record, info).map_err(|reason| LogError::Replay {
+        let read = names.recorded(&record).map_err(|reason| LogError::Replay {
             path: log.path().to_owned(),
             reason,
         })?;

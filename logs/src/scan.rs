@@ -9,7 +9,7 @@ use mcap::records::{MessageHeader, op};
 
 use crate::LogError;
 use crate::channel::{ChannelInfo, Role, SchemaInfo};
-use crate::frames::{Care, Frame, Frames, LIMIT_BYTES, describe};
+use crate::frames::{Care, Frame, Frames, HEAD_BYTES, LIMIT_BYTES, describe, record_head};
 use crate::parse::{
     ChannelRecord, ChunkRecord, MESSAGE_HEADER_BYTES, Parser, SchemaRecord, message_header,
     metadata,
@@ -89,7 +89,15 @@ pub(crate) struct Scanner {
     over: bool,
     /// The message that was yielded last.
     last: Option<(MessageHeader, Position, Within)>,
+    /// Chunks are not opened.
+    leaves_chunks: bool,
+    /// Which messages of chunks are passed over by what they say, and the last of those.
+    passes: Option<Passes>,
+    passed: Option<(MessageHeader, Position)>,
 }
+
+/// Whether a message is passed over, by its first bytes.
+type Passes = Box<dyn Fn(&[u8]) -> bool + Send>;
 
 /// Which buffer holds a message.
 #[derive(Clone, Copy, PartialEq)]
@@ -124,7 +132,33 @@ impl Scanner {
             data_ended: false,
             over: false,
             last: None,
+            leaves_chunks: false,
+            passes: None,
+            passed: None,
         })
+    }
+
+    /// A scanner for what stands between chunks: these are passed over unopened.
+    pub(crate) fn outside_chunks(path: &Path) -> Result<Self, LogError> {
+        let mut scanner = Scanner::open(path)?;
+        scanner.leaves_chunks = true;
+        Ok(scanner)
+    }
+
+    /// Passes over messages of records, but for what was in flight, by what they say, as far as they are in chunks.
+    pub(crate) fn pass_over_records(&mut self, which: impl Fn(&[u8]) -> bool + Send + 'static) {
+        self.passes = Some(Box::new(which));
+    }
+
+    /// Where the last record is that was passed over by what it says, and with which channel.
+    pub(crate) fn passed(&self) -> Option<(MessageHeader, Position, u32)> {
+        let (head, position) = self.passed?;
+        Some((head, position, self.channel(head.channel_id)?.serial))
+    }
+
+    /// Passes over the messages of these channels, which are asked for as they are declared.
+    pub(crate) fn pass_over(&mut self, which: impl Fn(&ChannelInfo) -> bool + Send + 'static) {
+        self.declared.passed_over = Some(Box::new(which));
     }
 
     /// All channels that the file has declared so far, in the order of their serial numbers.
@@ -316,7 +350,11 @@ impl Scanner {
             }
             op::MESSAGE => {
                 let head = message_header(self.frames.content()).ok_or_else(malformed)?;
-                self.check_channel(head.channel_id).map_err(Some)?;
+                let slot = self.declared.slot(head.channel_id);
+                let slot = slot.ok_or_else(|| Some(undeclared(head.channel_id)))?;
+                if slot.is_passed_over {
+                    return Ok(Some(Found::Other));
+                }
                 let position = Position {
                     frame: offset,
                     inner: 0,
@@ -361,6 +399,9 @@ impl Scanner {
     fn open_chunk(&mut self, offset: u64) -> Result<(), String> {
         self.chunk_frame = offset;
         self.next_inner = 0;
+        if self.leaves_chunks {
+            return Ok(());
+        }
         let opened = match ChunkRecord::parse(self.frames.content()) {
             None => Err("a chunk that is malformed".to_owned()),
             Some(chunk) => {
@@ -376,27 +417,36 @@ impl Scanner {
     }
 
     /// Handles the next record of the open chunk.
+    #[inline]
     fn inner(&mut self) -> Result<Found, String> {
+        const CUT: &str = "a chunk that ends within a record";
         let start = self.next_inner;
-        let mut parser = Parser::new(&self.chunk[start..]);
-        let mut head = || Some((parser.u8()?, parser.u64()?));
-        let (opcode, length) = head().ok_or("a chunk that ends within a record")?;
-        let content = parser
-            .bytes(length)
-            .ok_or("a chunk that ends within a record")?;
-        self.next_inner = start + 9 + content.len();
+        let rest = &self.chunk[start..];
+        let (opcode, length) = record_head(rest).ok_or(CUT)?;
+        let length = usize::try_from(length).map_err(|_| CUT)?;
+        let content = rest[HEAD_BYTES as usize..].get(..length).ok_or(CUT)?;
+        self.next_inner = start + HEAD_BYTES as usize + length;
         let malformed = || format!("a {} in a chunk that is malformed", describe(opcode));
         match opcode {
             op::MESSAGE => {
                 let head = message_header(content).ok_or_else(malformed)?;
-                if let Err(what) = self.check_channel(head.channel_id) {
-                    return Ok(Found::Stray(what));
-                }
+                let is_looked_at = match self.declared.slot(head.channel_id) {
+                    Some(slot) if slot.is_passed_over => return Ok(Found::Other),
+                    Some(slot) => slot.is_looked_at,
+                    None => return Ok(Found::Stray(undeclared(head.channel_id))),
+                };
                 let inner = u32::try_from(start).map_err(|_| malformed())?;
                 let position = Position {
                     frame: self.chunk_frame,
                     inner,
                 };
+                if let Some(passes) = &self.passes
+                    && is_looked_at
+                    && passes(&content[MESSAGE_HEADER_BYTES..])
+                {
+                    self.passed = Some((head, position));
+                    return Ok(Found::Other);
+                }
                 Ok(Found::Message(head, position))
             }
             op::SCHEMA | op::CHANNEL => {
@@ -411,13 +461,6 @@ impl Scanner {
 
     fn channel(&self, id: u16) -> Option<&Arc<ChannelInfo>> {
         self.declared.channel(id)
-    }
-
-    fn check_channel(&self, id: u16) -> Result<(), String> {
-        match self.channel(id) {
-            Some(_) => Ok(()),
-            None => Err(format!("a message on channel {id}, which is not declared")),
-        }
     }
 
     /// The message that [`Scanner::inner`] has just found; it ends where the next record starts.
@@ -442,6 +485,11 @@ impl Scanner {
     }
 }
 
+#[cold]
+fn undeclared(id: u16) -> String {
+    format!("a message on channel {id}, which is not declared")
+}
+
 /// What is at `offset` cannot be used.
 fn damage(offset: u64, what: impl Into<String>) -> Item<'static> {
     let what = what.into();
@@ -459,14 +507,29 @@ enum Summary {
 #[derive(Default)]
 struct Declared {
     schemas: BTreeMap<u16, Arc<SchemaInfo>>,
-    channels: Vec<Option<Arc<ChannelInfo>>>,
+    channels: Vec<Option<Slot>>,
     /// Every channel there was, by serial number.
     all: Vec<Arc<ChannelInfo>>,
+    passed_over: Option<Box<dyn Fn(&ChannelInfo) -> bool + Send>>,
+}
+
+/// A channel that is declared.
+struct Slot {
+    channel: Arc<ChannelInfo>,
+    /// Its messages are wanted by nobody.
+    is_passed_over: bool,
+    /// Its messages are wanted by what they say.
+    is_looked_at: bool,
 }
 
 impl Declared {
-    fn channel(&self, id: u16) -> Option<&Arc<ChannelInfo>> {
+    #[inline]
+    fn slot(&self, id: u16) -> Option<&Slot> {
         self.channels.get(usize::from(id)).and_then(Option::as_ref)
+    }
+
+    fn channel(&self, id: u16) -> Option<&Arc<ChannelInfo>> {
+        self.slot(id).map(|slot| &slot.channel)
     }
 
     fn declare(&mut self, opcode: u8, content: &[u8], summary: Summary) -> Option<()> {
@@ -498,7 +561,7 @@ impl Declared {
         });
         self.schemas.insert(schema.id, info.clone());
         // Channels that came in front of their schema.
-        for channel in self.channels.iter_mut().flatten() {
+        for Slot { channel, .. } in self.channels.iter_mut().flatten() {
             if channel.schema_id == schema.id && channel.schema.is_none() {
                 let bound = ChannelInfo {
                     schema: Some(info.clone()),
@@ -516,7 +579,7 @@ impl Declared {
     fn add_channel(&mut self, channel: ChannelRecord<'_>) {
         let at = usize::from(channel.id);
         if self.channels.len() <= at {
-            self.channels.resize(at + 1, None);
+            self.channels.resize_with(at + 1, || None);
         }
         let info = Arc::new(ChannelInfo {
             serial: self.all.len() as u32,
@@ -528,6 +591,12 @@ impl Declared {
             schema_id: channel.schema_id,
         });
         self.all.push(info.clone());
-        self.channels[at] = Some(info);
+        let is_passed_over = self.passed_over.as_ref().is_some_and(|which| which(&info));
+        let is_record = info.role == Role::Record;
+        self.channels[at] = Some(Slot {
+            is_looked_at: is_record && !info.topic.starts_with("/in_flight/"),
+            channel: info,
+            is_passed_over,
+        });
     }
 }

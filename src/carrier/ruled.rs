@@ -5,8 +5,8 @@ use crate::ids::{EntityId, KindIndex};
 use crate::ruling::{MessageNumber, MessageOf, RULED, Rule, Ruling, RulingEnd, Rulings};
 use crate::time::SimDuration;
 
-/// The rulings on the message of a parcel.
-fn on<'a>(rulings: &'a Rulings, parcel: &Parcel<'_>) -> impl Iterator<Item = &'a Rule> {
+/// The rulings on the message of a parcel, in the order in which they were declared.
+fn on<'a>(rulings: &'a Rulings, parcel: &Parcel<'_>) -> Vec<&'a Rule> {
     let ends: (EntityId, EntityId, KindIndex) = (parcel.sender, parcel.receiver, parcel.kind_index);
     let message = move |number| MessageOf {
         sender: ends.0,
@@ -18,15 +18,15 @@ fn on<'a>(rulings: &'a Rulings, parcel: &Parcel<'_>) -> impl Iterator<Item = &'a
     let repeat = parcel.repeat;
     let key = parcel.match_key;
     let by_key = key.map(|key| message(MessageNumber::Key { key, repeat }));
-    let messages = [Some(by_ordinal), by_key].into_iter().flatten();
-    messages.flat_map(|message| rulings.on(&message).collect::<Vec<_>>())
+    rulings.on([Some(by_ordinal), by_key].into_iter().flatten())
 }
 
 /// Whether a copy of the message is to arrive that its link would lose.
 #[cold]
 pub(super) fn spares(rulings: &Rulings, parcel: &Parcel<'_>, copy: u32) -> bool {
-    let is_to = |rule: &&Rule| rule.copy == copy && matches!(rule.ruling, Ruling::Deliver { .. });
-    let rule = on(rulings, parcel).find(is_to);
+    let is_to = |rule: &&&Rule| rule.copy == copy && matches!(rule.ruling, Ruling::Deliver { .. });
+    let rules = on(rulings, parcel);
+    let rule = rules.iter().find(is_to);
     if let Some(rule) = rule {
         rule.met(RulingEnd::Applied);
     }
@@ -37,7 +37,8 @@ impl Verdicts {
     /// Changes what a link has decided of a message as rulings on it say.
     #[cold]
     pub(crate) fn rule(&mut self, rulings: &Rulings, parcel: &Parcel<'_>, min_delay: SimDuration) {
-        for rule in on(rulings, parcel) {
+        let rules = on(rulings, parcel);
+        for (at, rule) in rules.iter().enumerate() {
             let Some(place) = rule.copy.checked_sub(parcel.copy) else {
                 continue;
             };
@@ -52,8 +53,21 @@ impl Verdicts {
                 false => RulingEnd::Applied,
             });
             *verdict = ruled;
+            for before in &rules[..at] {
+                if before.copy == rule.copy && contradict(before.ruling, rule.ruling) {
+                    before.met(RulingEnd::Overruled);
+                }
+            }
         }
     }
+}
+
+/// Whether one loses what the other delivers.
+fn contradict(one: Ruling, other: Ruling) -> bool {
+    matches!(
+        (one, other),
+        (Ruling::Lose, Ruling::Deliver { .. }) | (Ruling::Deliver { .. }, Ruling::Lose)
+    )
 }
 
 /// What a ruling makes of a verdict; none of one that is not the last.

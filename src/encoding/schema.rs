@@ -57,12 +57,7 @@ impl Schema {
     /// assert!(matches!(error, SchemaError::NotAContainer { .. }));
     /// ```
     pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
-        let mut traced = trace::trace::<T>()?;
-        let flat = lower::lower(&traced.registry.containers, traced.root);
-        let schema = Schema {
-            name: traced.registry.containers[traced.root].name,
-            flat,
-        };
+        let (schema, mut traced) = Schema::traced::<T>()?;
         // A study builds the same simulation a thousand times.
         static CHECKED: Mutex<BTreeSet<TypeId>> = Mutex::new(BTreeSet::new());
         let checked = || CHECKED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -78,6 +73,25 @@ impl Schema {
             checked().insert(id);
         }
         Ok(schema)
+    }
+
+    /// The same, without trying whether values come back: for what starts no run, but goes through one again.
+    pub(crate) fn untried<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError>
+    {
+        let (schema, traced) = Schema::traced::<T>()?;
+        for sample in traced.values {
+            let _ = dropped(sample);
+        }
+        Ok(schema)
+    }
+
+    fn traced<T: DeserializeOwned>() -> Result<(Schema, trace::Traced<T>), SchemaError> {
+        let traced = trace::trace::<T>()?;
+        let schema = Schema {
+            name: traced.registry.containers[traced.root].name,
+            flat: lower::lower(&traced.registry.containers, traced.root),
+        };
+        Ok((schema, traced))
     }
 
     /// The message kind: the serde name of the type.

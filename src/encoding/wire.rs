@@ -184,9 +184,20 @@ pub(super) enum Malformed {
     Tag(u64),
 }
 
-/// Reads one varint at `pos`, moving it.
-#[inline]
+/// Reads one varint at `pos`, moving it. Most have one byte.
+#[inline(always)]
 pub(super) fn take_varint(bytes: &[u8], pos: &mut usize) -> Result<u64, Malformed> {
+    match bytes.get(*pos) {
+        Some(&byte) if byte < 0x80 => {
+            *pos += 1;
+            Ok(u64::from(byte))
+        }
+        _ => take_long_varint(bytes, pos),
+    }
+}
+
+#[inline(never)]
+fn take_long_varint(bytes: &[u8], pos: &mut usize) -> Result<u64, Malformed> {
     let mut value = 0;
     for shift in 0..10 {
         let byte = *bytes.get(*pos).ok_or(Malformed::Cut)?;

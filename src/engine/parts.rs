@@ -57,6 +57,8 @@ pub(crate) struct Parts {
     pub(crate) topology: Arc<Topology>,
     /// As the topology says.
     recording: bool,
+    /// By entity, whose messages alone are encoded; all, if it is none.
+    encoded: Option<Box<[bool]>>,
     index: u32,
     links: Vec<LinkCell>,
     pub(crate) queue: Queue,
@@ -98,6 +100,7 @@ impl Parts {
         Parts {
             key: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
             recording: topology.recording(),
+            encoded: None,
             topology,
             index,
             links,
@@ -158,6 +161,11 @@ impl Parts {
         self.body.clear();
     }
 
+    /// Encodes the messages of these entities only, and no timers: nobody looks at others.
+    pub(crate) fn encode_only(&mut self, of_entity: Box<[bool]>) {
+        self.encoded = Some(of_entity);
+    }
+
     /// Encodes the message of the event in hand, if anyone will look at it.
     #[inline(always)]
     pub(crate) fn encode(
@@ -166,6 +174,11 @@ impl Parts {
         head: &Head,
     ) -> Result<(), Box<Fault>> {
         if !self.recording {
+            return Ok(());
+        }
+        if let Some(encoded) = &self.encoded
+            && (head.class == Class::Timer || !encoded[head.sender.index()])
+        {
             return Ok(());
         }
         if let (Some(letter), Some(kind)) = (letter, head.kind()) {

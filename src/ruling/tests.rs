@@ -124,6 +124,39 @@ fn does() -> impl Strategy<Value = Does> {
     ]
 }
 
+/// Whatever name each uses, the one that is declared later decides, and the other says that it does not.
+#[test]
+fn of_two_that_contradict_each_other_the_later_decides() {
+    let deliver = Ruling::Deliver {
+        after: SimDuration::ZERO,
+    };
+    // The message of ordinal 1 has the key 0.0.
+    let names = ["source,sink,Ping,1", "source,sink,Ping,0.0"];
+    for does in [Does::Delivers, Does::Loses, Does::LosesUnlessSpared] {
+        for (one, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            for (first, second, arrives) in [
+                (Ruling::Lose, deliver, true),
+                (deliver, Ruling::Lose, false),
+            ] {
+                let rules = [(names[one], first), (names[other], second)];
+                let (fates, report) = run(&[does; 20], &rules, Executor::Inline);
+                let fate = fates.iter().find(|fate| fate.0 == 1).unwrap();
+                assert_eq!(fate.3.is_empty(), arrives, "{does:?} {rules:?}");
+                assert_eq!(
+                    report.rulings[0],
+                    RulingEnd::Overruled,
+                    "{does:?} {rules:?}"
+                );
+                assert_ne!(
+                    report.rulings[1],
+                    RulingEnd::Overruled,
+                    "{does:?} {rules:?}"
+                );
+            }
+        }
+    }
+}
+
 proptest! {
     /// A ruling changes the message that it names and no other, alike on both executors; and says what
     /// came of it.

@@ -237,7 +237,12 @@ impl Simulation {
                 continue;
             }
             // It is the type's own `Deserialize` that shows what is in it.
-            let schema = match guarded(entry.trace) {
+            // A part of a run that was: whether its types come back was tried as it started.
+            let trace = match self.live {
+                None => entry.trace,
+                Some(_) => entry.trace_untried,
+            };
+            let schema = match guarded(trace) {
                 Ok(traced) => traced.map_err(|error| error.to_string()),
                 Err(cause) => Err(cause.to_string()),
             };

@@ -73,7 +73,7 @@ impl Simulation {
                 return Err(error);
             }
         };
-        let Ok([engine]) = <[Engine; 1]>::try_from(engines) else {
+        let Ok([mut engine]) = <[Engine; 1]>::try_from(engines) else {
             unreachable!("a simulation that is not split has one engine");
         };
         let mut of_entity = vec![false; topology.info.entities.len()];
@@ -81,6 +81,7 @@ impl Simulation {
         for (live, entity) in declared {
             of_entity[entity.index()] = *live;
         }
+        engine.parts.encode_only(of_entity.clone().into());
         Ok(Stage {
             rebuilds: schedule.into_rebuilds(&topology),
             live: of_entity,

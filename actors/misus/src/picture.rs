@@ -1,6 +1,7 @@
 //! Pictures of a run, drawn from its log alone: the field with what is known of it, and a rover's
 //! resources over time. The same log gives the same bytes.
 
+pub(crate) mod account;
 mod classes;
 mod field;
 mod history;

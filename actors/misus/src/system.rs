@@ -6,8 +6,8 @@ use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
-    Recording, Removable, Section, Settings, Setup, SetupError, System,
+    Account, Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo,
+    PictureRequest, Recording, Removable, Section, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -123,6 +123,16 @@ impl Settings for MisusScenario {
         Ok(faults.fold(assembly, |assembly, (index, fault)| {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)
         }))
+    }
+
+    fn account(
+        &self,
+        actor: &str,
+        run: &dyn Recording,
+        until_ns: Option<u64>,
+        _setup: &mut Setup<'_>,
+    ) -> Result<Option<Account>, PictureError> {
+        picture::account::account(&names(&self.team), actor, run, until_ns)
     }
 
     fn draw(

@@ -19,6 +19,7 @@ mod fragments;
 mod loss;
 mod presets;
 mod random;
+mod redraw;
 
 /// A message of a size to choose.
 #[derive(Serialize, Deserialize)]

@@ -296,42 +296,44 @@ impl LinkBuilder {
             self.places_m.insert(name.clone(), *place_m);
         }
         self.hosts = wiring.hosts.iter().cloned().collect();
-        let mut links = Links::default();
-        let mut known = BTreeMap::new();
-        for ((_, from), (_, to)) in wiring.links() {
-            let resolved = self.resolve(from, to);
-            let resolved = (resolved.timeline.clone(), resolved.base.clone());
-            known.insert((from, to), resolved);
+        let resolved: Vec<_> = wiring
+            .links()
+            .map(|((_, from), (_, to))| {
+                let resolved = self.resolve(from, to);
+                (resolved.timeline.clone(), resolved.base.clone())
+            })
+            .collect();
+        let backs = wiring.backs();
+        let back = |at: usize| backs[at].map(|back| &resolved[back].0);
+        let names = std::mem::take(&mut self.names);
+        for (at, ((from, _), (to, _))) in wiring.links().enumerate() {
+            let timeline = resolved[at].0.clone();
+            self.connect(sim, (from, to), &names[at], timeline, back(at));
         }
-        for (from, to) in wiring.links() {
-            let (timeline, nominal) = known[&(from.1, to.1)].clone();
-            let back = known.get(&(to.1, from.1)).map(|(back, _)| back);
-            self.connect(sim, (from, to), timeline, back);
-            links.add(from.1, to.1, nominal);
-        }
+        self.names = names;
+        let nominal = resolved.iter().map(|(_, nominal)| nominal.clone());
+        let mut links = Links::of(wiring, nominal);
         let changed = self.changed.iter_mut();
         let changed = changed.map(|(at, changed)| (*at, &mut changed.slowdowns));
         links.processors = self.slowdowns.apply(changed, &wiring.processors)?;
-        let back = |(from, to)| known.get(&(to, from)).map(|(back, _)| back);
-        let met = known
-            .iter()
-            .map(|(ends, (timeline, _))| (timeline, back(*ends)));
+        let met = resolved.iter().enumerate();
+        let met = met.map(|(at, (timeline, _))| (timeline, back(at)));
         links.remarks = self.remarks(met);
         self.finish(sim, wiring.terrain.as_ref())?;
         links.remarks.extend(links.processors.remarks());
         Ok(links)
     }
 
-    /// Declares the link `{from}-{to}`, and its changes; `back` is what the link back has, if there
+    /// Declares the link called `name`, and its changes; `back` is what the link back has, if there
     /// is one. A link through a radio is declared with it, by [`LinkBuilder::finish`].
     fn connect(
         &mut self,
         sim: &mut Simulation,
-        ((from_host, from), (to_host, to)): ((HostId, &str), (HostId, &str)),
+        (from, to): (HostId, HostId),
+        name: &str,
         timeline: Arc<Timeline>,
         back: Option<&Arc<Timeline>>,
     ) {
-        let name = format!("{from}-{to}");
         let mut changes = Vec::new();
         for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
             changes.push((at, LinkChange::planned(before.1, params)));
@@ -343,15 +345,15 @@ impl LinkBuilder {
                 Some(back) => link.answered_over(back.clone()),
                 None => link,
             };
-            let id = sim.link(from_host, to_host, &name, link);
+            let id = sim.link(from, to, name, link);
             for (at, change) in changes {
                 sim.change_at(at, id, change);
             }
             return;
         };
         match self.radios.iter_mut().find(|radio| radio.name() == wanted) {
-            Some(radio) => radio.join(&name, (from_host, to_host), timeline, changes),
-            None => self.no_such_radio(&name, &wanted),
+            Some(radio) => radio.join(name, (from, to), timeline, changes),
+            None => self.no_such_radio(name, &wanted),
         }
     }
 
@@ -391,6 +393,22 @@ impl LinkBuilder {
             key,
             message: format!("{wanted:?}: expected the name of one of [radios]{hint}"),
         });
+    }
+
+    /// What the link from one host to another has when, as it will be built: for who asks of a run what its links
+    /// had.
+    ///
+    /// ```
+    /// use farside::SimTime;
+    /// use farside_actors::link::LinksConfig;
+    /// use farside_actors::wiring::LinkBuilder;
+    /// let config: LinksConfig = toml::from_str("'base-rover_*' = { loss = 0.5 }").unwrap();
+    /// let timeline = LinkBuilder::new(&config, &[])?.between("base", "rover_1");
+    /// assert_eq!(timeline.at(SimTime::ZERO).loss, 0.5);
+    /// # Ok::<(), farside_actors::link::LinkConfigError>(())
+    /// ```
+    pub fn between(&mut self, from: &str, to: &str) -> Arc<Timeline> {
+        self.resolve(from, to).timeline.clone()
     }
 
     /// What the link `{from}-{to}` has, and when.

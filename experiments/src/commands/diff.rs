@@ -1,9 +1,11 @@
 //! `farside diff`: two logs, message by message.
 
+pub(super) mod draws;
+
 use std::path::PathBuf;
 
 use farside_actors::units::parse_duration;
-use farside_logs::{DiffOptions, DiffReport, Tolerance};
+use farside_logs::{DiffOptions, DiffReport, Differing, Tolerance};
 use serde::Serialize;
 
 use super::Exit;
@@ -99,9 +101,17 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
             (None, Tolerance::TimeNs(time_ns)) => options.time_tolerance_ns = Some(time_ns),
         }
     }
-    let report = farside_logs::diff(&args.a, &args.b, &options)?;
+    let (mut report, differing) = match &args.html {
+        Some(_) => farside_logs::diff_marked(&args.a, &args.b, &options)?,
+        None => (
+            farside_logs::diff(&args.a, &args.b, &options)?,
+            Differing::default(),
+        ),
+    };
+    draws::tell(&mut report, [&args.a, &args.b], registry);
     if let Some(out) = &args.html {
-        let sides = [page::read(&args.a, 2)?, page::read(&args.b, 2)?];
+        let side = |log: usize| page::read_beside(&inputs[log], log, &differing);
+        let sides = [side(0)?, side(1)?];
         for (path, side) in inputs.iter().zip(&sides) {
             view::warn(path, side);
         }

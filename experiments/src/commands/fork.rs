@@ -16,6 +16,7 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::came::{BothCame, Came};
+use super::diff::draws;
 use super::kinds::{self, FileKind};
 use super::logged::scenario_of;
 use super::run::{ExecutorName, duration, ending, log_options};
@@ -162,7 +163,8 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     for remark in &remarks {
         tracing::warn!("{remark}");
     }
-    let differences = diff(path, &args.out, &DiffOptions::default())?;
+    let mut differences = diff(path, &args.out, &DiffOptions::default())?;
+    draws::tell(&mut differences, [path, &args.out], registry);
     let came = match args.metrics {
         true => {
             let fork = Came::of(&args.out, &report, &results);
@@ -307,6 +309,7 @@ fn changed(
     let mut table = read(&base.resolved()?)?;
     let text = |duration: SimDuration| Value::String(duration.to_string());
     let named = |id: &MessageId| ("message", Value::String(id.to_string()));
+    deliver_no_more(args, &mut table)?;
     add(
         &mut table,
         "lose",
@@ -345,6 +348,32 @@ fn changed(
     let written = toml::to_string(&table);
     let written = written.map_err(|error| CommandError::Arguments(error.to_string()))?;
     Ok((written, sets))
+}
+
+/// Takes out of a scenario the entries that deliver what is to be lost, whatever they call it: of two entries that
+/// contradict each other the one that delivers decides.
+fn deliver_no_more(args: &Args, table: &mut Table) -> Result<(), CommandError> {
+    let Some(Value::Array(entries)) = table.get_mut("deliver") else {
+        return Ok(());
+    };
+    // Entries that name no message were refused before.
+    let id = |entry: &Value| entry.get("message")?.as_str()?.parse().ok();
+    entries.retain(|entry| id(entry).is_some());
+    let delivered = entries.iter().filter_map(id);
+    let ids: Vec<MessageId> = args.lose.iter().cloned().chain(delivered).collect();
+    let found = find_messages(&args.log, &ids)?;
+    let named = ids.into_iter().zip(found);
+    let named = named.map(|(id, found)| {
+        let ordinal = found.ok().map(|message| message.ordinal);
+        (ordinal, [id.sender, id.receiver, id.kind], id.copy)
+    });
+    let named: Vec<_> = named.collect();
+    let (lost, mut named) = (&named[..args.lose.len()], named[args.lose.len()..].iter());
+    entries.retain(|_| {
+        let message = named.next();
+        !message.is_some_and(|message| message.0.is_some() && lost.contains(message))
+    });
+    Ok(())
 }
 
 fn read(text: &str) -> Result<Table, CommandError> {

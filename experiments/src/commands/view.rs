@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use farside::SimDuration;
+use farside_actors::units;
 use farside_logs::refuse_input;
 use serde_json::json;
 
 use super::kinds::{self, FileKind};
 use super::output::{self, Format};
 use super::{CommandError, Exit, print, print_json};
-use crate::page::{self, Side};
+use crate::page::{self, Side, Window};
 use crate::registry::Registry;
 
 #[derive(clap::Args)]
@@ -22,9 +24,31 @@ pub(crate) struct Args {
     /// Where to write the page; beside the log unless given
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
+    /// The beginning of a time span that the page shows; the start of the run unless given
+    #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
+    from: Option<SimDuration>,
+    /// The end of a time span; the end of the run unless given
+    #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
+    at: Option<SimDuration>,
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    fn window(&self) -> Result<Window, CommandError> {
+        if let (Some(from), Some(at)) = (self.from, self.at)
+            && from > at
+        {
+            let message = format!("--from {from} is behind --at {at}");
+            return Err(CommandError::Arguments(message));
+        }
+        let whole = Window::default();
+        Ok(Window {
+            from_ns: self.from.map_or(whole.from_ns, SimDuration::as_nanos),
+            until_ns: self.at.map_or(whole.until_ns, SimDuration::as_nanos),
+        })
+    }
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
@@ -34,7 +58,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let out = out.unwrap_or_else(|| path.with_extension("html"));
     let inputs = std::slice::from_ref(path);
     output::spare(inputs, std::slice::from_ref(&out))?;
-    let side = page::read(path, 1)?;
+    let side = page::read(path, args.window()?)?;
+    if let Some(from) = args.from.filter(|_| side.is_behind_its_end) {
+        let message = format!("--from {from}: the log ends before");
+        return Err(CommandError::Arguments(message));
+    }
     let text = page::of_run(&side);
     write(&out, &text, inputs)?;
     warn(path, &side);

@@ -33,6 +33,17 @@ struct Entity {
     versions: Vec<(u64, Option<usize>)>,
 }
 
+impl Entity {
+    /// Has these shapes from a time on.
+    fn change(&mut self, at_us: u64, shape: Option<usize>) {
+        // Of all that was before the time that the page shows, the last.
+        if at_us == 0 {
+            self.versions.clear();
+        }
+        self.versions.push((at_us, shape));
+    }
+}
+
 /// The map of a log.
 #[derive(Debug, Default)]
 pub(super) struct Map {
@@ -170,7 +181,12 @@ impl Map {
             return;
         }
         let [x, y, turn] = at;
-        frame.places.push([(at_ns / 1_000) as i64, x, y, turn]);
+        let at_us = (at_ns / 1_000) as i64;
+        // Of all that was before the time that the page shows, the last.
+        if at_us == 0 {
+            frame.places.clear();
+        }
+        frame.places.push([at_us, x, y, turn]);
         if frame.places.len() >= PLACES {
             let mut keep = false;
             frame.places.retain(|_| {
@@ -195,18 +211,18 @@ impl Map {
             let is_its = |key: &String| *key == id || all && key.starts_with(&name(""));
             for (key, entity) in &mut self.entities {
                 if is_its(key) && entity.versions.last().is_some_and(|(_, s)| s.is_some()) {
-                    entity.versions.push((at_us, None));
+                    entity.change(at_us, None);
                 }
             }
         }
         for entity in elements(value, "entities") {
             let id = name(&text(entity, "id"));
             let shape = self.shape(entity);
-            let versions = &mut self.entities.entry(id).or_default().versions;
+            let entity = self.entities.entry(id).or_default();
             if let Some(shape) = shape
-                && versions.last().map(|(_, last)| *last) != Some(Some(shape))
+                && entity.versions.last().map(|(_, last)| *last) != Some(Some(shape))
             {
-                versions.push((at_us, Some(shape)));
+                entity.change(at_us, Some(shape));
             }
         }
     }

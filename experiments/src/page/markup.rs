@@ -129,12 +129,17 @@ fn chart(sides: usize) -> Markup {
                 label { "Kind " select #kinds { option value="" { "all" } } }
                 label { "Reason " select #reasons { option value="" { "all" } } }
                 fieldset #fates { legend .hidden { "Fates" } }
+                @if sides > 1 { label { input #differing type="checkbox"; "only what differs" } }
                 span .buttons {
                     button #nearer type="button" title="Nearer (+)" aria-label="Zoom in" { "+" }
                     button #farther type="button" title="Farther (−)" aria-label="Zoom out" { "−" }
                     button #whole type="button" title="The whole run (0)" { "All" }
                     button #loss-before type="button" title="The loss before (L)" { "◀ loss" }
                     button #loss-after type="button" title="The next loss (l)" { "loss ▶" }
+                    @if sides > 1 {
+                        button #difference-before type="button" title="The difference before (D)" { "◀ differs" }
+                        button #difference-after type="button" title="The next difference (d)" { "differs ▶" }
+                    }
                 }
             }
             div #lanes tabindex="0" role="application" aria-labelledby="chart-title" aria-describedby="chart-help" {
@@ -191,7 +196,7 @@ fn help() -> Markup {
             summary { "Keys" }
             p .note {
                 "Space plays and pauses. Left and right step by a hundredth of what the chart shows, comma and full stop \
-                 from event to event, l and L from loss to loss; plus and minus zoom the chart, 0 shows all of it. In the \
+                 from event to event, l and L from loss to loss, d and D from one message that differs to the next; plus and minus zoom the chart, 0 shows all of it. In the \
                  chart the arrow keys go from message to message and Enter selects; drag moves in time, and two fingers \
                  or Ctrl and the wheel zoom. On the map drag moves, the wheel zooms, and a double click shows all of it."
             }

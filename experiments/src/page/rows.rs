@@ -31,11 +31,13 @@ pub(super) struct Happened<'a> {
     pub(super) sent_ns: u64,
     pub(super) key: Option<KeyRef<'a>>,
     pub(super) cause: Option<KeyRef<'a>>,
+    /// The other log of a comparison has it otherwise, or not.
+    pub(super) differs: bool,
 }
 
 impl<'a> Happened<'a> {
-    /// A record, at the time at which it was logged.
-    pub(super) fn of(record: &RecordRef<'a>, at_ns: u64) -> Happened<'a> {
+    /// A record, at the time at which it was logged; times since `from_ns`.
+    pub(super) fn of(record: &RecordRef<'a>, at_ns: u64, from_ns: u64) -> Happened<'a> {
         // The key of a loss is that of the event that sent the message, and of what is in flight that of an event
         // that never was: neither caused anything.
         let is_event = !matches!(record.class, RecordClass::Lost | RecordClass::InFlight);
@@ -49,9 +51,10 @@ impl<'a> Happened<'a> {
             ordinal: record.ordinal,
             copy: record.copy,
             at_ns,
-            sent_ns: record.sent_ns.min(at_ns),
+            sent_ns: record.sent_ns.saturating_sub(from_ns).min(at_ns),
             key: is_event.then_some(record.key),
             cause: record.cause,
+            differs: false,
         }
     }
 
@@ -201,12 +204,14 @@ pub(super) struct Rows {
     next: Vec<u64>,
     /// By source and its counter, the row of an event.
     events: BTreeMap<(u32, u64), u32>,
-    columns: [Column; 6],
+    columns: [Column; 7],
     rows: u32,
     last_at: u64,
     left_out: u64,
     first_left_out_ns: Option<u64>,
     counts: BTreeMap<String, u64>,
+    /// How many rows differ from those of another log.
+    differing: u64,
     bins: Bins,
     until_ns: u64,
     pub(super) details: Details,
@@ -225,6 +230,7 @@ pub(super) struct Told<'a> {
     left_out: u64,
     first_left_out_ns: Option<u64>,
     counts: &'a BTreeMap<String, u64>,
+    differing: u64,
     bins: &'a Bins,
     details: usize,
     details_left_out: u64,
@@ -246,6 +252,7 @@ impl Rows {
             left_out: 0,
             first_left_out_ns: None,
             counts: BTreeMap::new(),
+            differing: 0,
             bins: Bins::default(),
             until_ns: 0,
             details,
@@ -328,7 +335,7 @@ impl Rows {
             (Some(_), None) => 1,
             (Some(_), Some(cause)) => u64::from(row - cause) + 1,
         };
-        let [flows, times, delays, causes, ordinals, copies] = &mut self.columns;
+        let [flows, times, delays, causes, ordinals, copies, marks] = &mut self.columns;
         flows.push(u64::from(flow));
         // Logs of other programs may go back in time.
         times.push_signed(at.wrapping_sub(self.last_at) as i64);
@@ -336,6 +343,8 @@ impl Rows {
         causes.push(back);
         ordinals.push_signed(ordinal);
         copies.push(u64::from(happened.copy));
+        marks.push(u64::from(happened.differs));
+        self.differing += u64::from(happened.differs);
         self.last_at = at;
     }
 
@@ -350,6 +359,7 @@ impl Rows {
             left_out: self.left_out,
             first_left_out_ns: self.first_left_out_ns,
             counts: &self.counts,
+            differing: self.differing,
             bins: &self.bins,
             details: self.details.rows(),
             details_left_out: self.details.left_out(),
@@ -398,6 +408,7 @@ mod tests {
                 count: before,
                 ..KeyRef::default()
             }),
+            differs: count == 1,
         }
     }
 
@@ -422,7 +433,7 @@ mod tests {
             ..KeyRef::default()
         });
         rows.add(&unknown, String::new);
-        // Flows, times, delays, causes, ordinals, copies of four rows.
+        // Flows, times, delays, causes, ordinals, copies, marks of four rows.
         let expected = [
             [0, 0, 0, 0],
             [0, 20, 20, 40],
@@ -430,6 +441,7 @@ mod tests {
             [0, 2, 2, 1],
             [0, 0, 0, 0],
             [0; 4],
+            [0, 1, 0, 0],
         ];
         assert_eq!(rows.bytes(), expected.concat());
     }

@@ -27,6 +27,7 @@ fn hostile() -> Side {
         shown: 0,
         left_out: 0,
         notes: Vec::new(),
+        is_behind_its_end: false,
     }
 }
 
@@ -188,7 +189,7 @@ fn causes_on_the_page_are_those_that_the_log_has() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     log(&path);
-    let side = super::read(&path, 1).unwrap();
+    let side = super::read(&path, super::Window::default()).unwrap();
     let rows = decoded(&side);
     assert_eq!(rows.len(), side.shown as usize);
     let is_message = |row: &&Row| ["delivered", "lost"].contains(&row.names[0].as_str());

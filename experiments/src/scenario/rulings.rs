@@ -111,6 +111,9 @@ pub(crate) fn remarks(shared: &Shared, report: &Report) -> Vec<String> {
             RulingEnd::WithoutEffect => Some(format!(
                 "{key} has no effect: that became of {message} anyway"
             )),
+            RulingEnd::Overruled => Some(format!(
+                "{key} is overruled: another entry says that {message} arrives, whatever it calls it"
+            )),
         }
     };
     ends.filter_map(remark).collect()

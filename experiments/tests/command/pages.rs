@@ -165,9 +165,83 @@ fn two_runs_are_on_one_page_with_what_differs() {
     assert_eq!(number(&browser.value("farside.state.time")), first_ns);
     let title = browser.value("document.getElementById('selected').textContent");
     assert!(title.as_str().unwrap().contains("node_14"), "{title}");
+    // Each message that differs is marked, and none before the fork.
+    let differing = "farside.state.sides.map((side) => [side.told.differing, side.rows.differs.reduce((n, d) => n + d, 0), \
+                     side.rows.at[side.rows.differs.indexOf(1)]])";
+    let differing = browser.value(differing);
+    for (side, only) in ["only_in_a", "only_in_b"].into_iter().enumerate() {
+        let [told, marked, first] = [0, 1, 2].map(|at| number(&differing[side][at]));
+        let expected = number(&report[only]) + number(&report["changed"]);
+        assert!(
+            told == marked && marked >= expected && first >= 4e9,
+            "{differing} {expected}"
+        );
+        assert!(
+            marked <= expected + number(&report["reordered"]),
+            "{differing} {report}"
+        );
+    }
+    browser.click_on("#differing");
+    browser.wait(
+        "farside.sequence.shown().list.every((row) => farside.state.side.rows.differs[row] === 1)",
+    );
+    browser.press("d");
+    browser.wait("farside.state.side.rows.differs[farside.state.selected.row] === 1");
+    browser.click_on("#differing");
     browser.click_on("input[name=side][value='0']");
     browser.wait("farside.state.index === 0");
     assert!(number(&browser.value("farside.state.reached.size")) > 1.0);
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+/// A part of a run has what happened in it, at the times of the run, and the map as it was by then.
+#[test]
+fn a_part_of_a_run_is_shown_from_where_things_stood() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), "run.mcap", &[]);
+    let view = |html: &str, span: &[&str]| {
+        let args = [&["view", "run.mcap", "--html", html, "--json"], span].concat();
+        farside(folder.path(), &args)
+    };
+    let whole = printed(&view("whole.html", &[]));
+    let output = view("part.html", &["--from", "4s", "--at", "6500ms"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let part = printed(&output);
+    assert!(
+        number(&part["shown"]) < number(&whole["shown"]) / 2.0,
+        "{part} {whole}"
+    );
+    assert!(
+        part["notes"][0]
+            .as_str()
+            .unwrap()
+            .contains("from 4s to 6.5s"),
+        "{part}"
+    );
+    for span in [
+        ["--from", "5s", "--at", "4s"],
+        ["--from", "99h", "--at", "100h"],
+    ] {
+        let output = view("none.html", &span);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+        assert!(!folder.path().join("none.html").exists());
+    }
+    let times = "[...farside.state.side.rows.at].map((at) => at + farside.state.side.head.from_ns)";
+    let Some(mut browser) = opened(&folder.path().join("whole.html"), 1600, "light") else {
+        return;
+    };
+    let all = browser.value(times);
+    let all = all.as_array().unwrap().iter().map(number);
+    let within: Vec<f64> = all.filter(|at| (4e9..=6.5e9).contains(at)).collect();
+    let places = "JSON.stringify(farside.state.sides[0].map.frames.map((frame) => frame.name))";
+    let frames = browser.value(places);
+    let mut browser = opened(&folder.path().join("part.html"), 390, "dark").unwrap();
+    let shown = browser.value(times);
+    let shown: Vec<f64> = shown.as_array().unwrap().iter().map(number).collect();
+    assert_eq!(shown, within);
+    assert_eq!(browser.value(places), frames);
+    let said = browser.value("document.getElementById('now').textContent");
+    assert!(said.as_str().unwrap().starts_with("4.0"), "{said}");
     assert_eq!(browser.complaints, Vec::<String>::new());
 }
 

@@ -419,6 +419,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             actor: String::new(),
             message: None,
             draw: None,
+            by_chance: None,
             more: 0,
         }
     }
@@ -474,6 +475,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             what: format!("{whose} on {}: {}", told.name(), told.fates()),
             actor: link.unwrap_or_default(),
             message: told.message(),
+            by_chance: told.by_chance().filter(|_| !ruled),
             draw: Some(match ruled {
                 true => "none: the scenario rules what becomes of it".to_owned(),
                 false => told.draw(),

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::behaviour::Changes;
 use super::causal::Walker;
+use super::differing::Differing;
 use super::entry::{Entry, Mode, Names};
 use super::found::{Found, Pair, Places};
 use super::index::{self, Index};
@@ -32,6 +33,7 @@ pub(super) fn compare(
     b: &Path,
     options: &DiffOptions,
     limits: Limits,
+    differing: Option<&mut Differing>,
 ) -> Result<(DiffReport, Usage), LogError> {
     // A glob that makes no sense is told before anything is read.
     Topics::new(&options.ignore)?.and_all_but(&options.topics)?;
@@ -54,6 +56,7 @@ pub(super) fn compare(
         };
         comparison = read(all)?;
     }
+    comparison.differing = differing;
     known::check((&comparison.a, &comparison.b), mode, options)?;
     comparison.find_offset()?;
     let strangers = heads.iter().filter(|head| head.is_none()).count();
@@ -112,6 +115,8 @@ struct Comparison<'a> {
     earliest: Option<Found>,
     /// The earliest that nobody injected.
     earliest_own: Option<Found>,
+    /// Which messages differ, for who wants to know.
+    differing: Option<&'a mut Differing>,
     /// Of Farside's logs, whom the differences touched first.
     reach: Reach,
     /// In what the starts of the two runs differ.
@@ -185,11 +190,12 @@ impl<'a> Comparison<'a> {
             sample: BTreeMap::new(),
             renumbered,
             left: (Buckets::new(limits.left()), Buckets::new(limits.left())),
-            shifts: Shifts::default(),
+            shifts: Shifts::new(limits.shifted),
             to_read: Buckets::new(limits.pairs),
             places: Buckets::new(limits.pairs),
             earliest: None,
             earliest_own: None,
+            differing: None,
             reach,
             starts: Starts::default(),
             by_field,
@@ -261,6 +267,9 @@ impl<'a> Comparison<'a> {
     }
 
     fn found(&mut self, found: Found) {
+        if let Some(differing) = &mut self.differing {
+            differing.add(&found);
+        }
         let when = found.when(&self.names);
         let place = (when, found.rank());
         let is_earlier = |known: &Option<Found>| match known {

@@ -92,21 +92,35 @@ pub(super) fn by_place(a: &[Entry], b: &[Entry], shifts: &Shifts) -> Matching {
     by_key((a, b), (place_a, place_b), in_turn)
 }
 
-/// Places that are remembered of messages that have another in the other log.
-const SHIFTED: usize = 1 << 18;
-
 /// By how much the places in flows of the second log are those of the first, from a place on.
-#[derive(Default)]
 pub(super) struct Shifts {
     /// By flow: from which place in the second log on, and by how much.
     flows: BTreeMap<u64, Vec<(u64, i64)>>,
     count: usize,
+    /// So many places are remembered.
+    most: usize,
+    /// How many more there were.
+    pub(super) forgotten: u64,
 }
 
 impl Shifts {
+    /// A memory of so many places.
+    pub(super) fn new(most: usize) -> Shifts {
+        Shifts {
+            flows: BTreeMap::new(),
+            count: 0,
+            most,
+            forgotten: 0,
+        }
+    }
+
     /// Notes two records that are the same.
     pub(super) fn add(&mut self, a: &Entry, b: &Entry) {
-        if !a.has_place || a.ordinal == b.ordinal || self.count >= SHIFTED {
+        if !a.has_place || a.ordinal == b.ordinal {
+            return;
+        }
+        if self.count >= self.most {
+            self.forgotten += 1;
             return;
         }
         let shift = b.ordinal.wrapping_sub(a.ordinal).cast_signed();

@@ -211,6 +211,7 @@ fn ways() -> Vec<Limits> {
         pairs: usize::MAX,
         message_bytes: usize::MAX,
         passes_front: false,
+        ..Limits::default()
     };
     let mut ways = vec![whole];
     for (passes_front, entries, pairs, message_bytes) in [
@@ -224,6 +225,7 @@ fn ways() -> Vec<Limits> {
             pairs,
             message_bytes,
             passes_front,
+            ..whole
         });
     }
     ways
@@ -249,7 +251,7 @@ impl Logs {
     }
 
     fn compare(&self, options: &DiffOptions, limits: Limits) -> (DiffReport, Usage) {
-        comparison::compare(&self.a, &self.b, options, limits).unwrap()
+        comparison::compare(&self.a, &self.b, options, limits, None).unwrap()
     }
 }
 
@@ -275,6 +277,45 @@ fn what_is_nearly_at_one_time_has_no_offset() {
     let logs = Logs::write(&measured(0, 1), &measured(1, 2), [0, 0], false);
     let (found, _) = logs.compare(&DiffOptions::default(), ways()[0]);
     assert_eq!(found.offset_ns, 0);
+}
+
+/// The second log has one message less at the front, so that all others have another place in their flow, and says
+/// the last one otherwise.
+#[test]
+fn places_that_are_forgotten_are_told() {
+    let sent = |at: u64, ordinal: u64, body: u8| Made {
+        fate: 0,
+        sender: 0,
+        receiver: 1,
+        ordinal,
+        match_key: None,
+        time_ns: 10 * at + 10,
+        sent_ns: 10 * at + 10,
+        count: at,
+        cause: None,
+        body: vec![body],
+        attempts: 0,
+    };
+    let a: Vec<Made> = (0..6).map(|at| sent(at, at, at as u8)).collect();
+    let mut b: Vec<Made> = (1..6).map(|at| sent(at, at - 1, at as u8)).collect();
+    b[4].body = vec![99];
+    let logs = Logs::write(&a, &b, [0, 0], true);
+    let told = |shifted: usize| {
+        let limits = Limits {
+            shifted,
+            ..Limits::default()
+        };
+        let (report, _) = logs.compare(&DiffOptions::default(), limits);
+        let is_told = |note: &&String| note.contains("are kept in mind");
+        (report.notes.iter().find(is_told).cloned(), report.changed)
+    };
+    assert_eq!(told(4), (None, 1));
+    let (note, _) = told(3);
+    let note = note.unwrap();
+    assert!(
+        note.starts_with("4 messages have another place in their flow, of which 3"),
+        "{note}"
+    );
 }
 
 proptest! {
@@ -369,6 +410,7 @@ fn memory_is_bounded_where_nothing_agrees() {
         pairs: 500,
         message_bytes: 20_000,
         passes_front: true,
+        ..Limits::default()
     };
     for tolerance in [0.0, 1e-9] {
         let options = DiffOptions {
@@ -452,7 +494,8 @@ fn what_agreed_is_read_by_field_where_a_later_schema_differs() {
         writer.finish().unwrap();
         path
     });
-    let compare = |limits| comparison::compare(&a, &b, &DiffOptions::default(), limits).unwrap();
+    let compare =
+        |limits| comparison::compare(&a, &b, &DiffOptions::default(), limits, None).unwrap();
     let (expected, _) = compare(ways()[0]);
     let (found, usage) = compare(Limits::default());
     assert_eq!(found, expected);

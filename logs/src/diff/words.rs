@@ -149,24 +149,40 @@ impl Told<'_> {
         }
     }
 
-    /// What is known of the draw behind what a link decided.
-    pub(super) fn draw(&self) -> String {
-        let reasons: Vec<&str> = self
+    /// Why it was lost in one of them, or in both.
+    fn lost_for(&self) -> Option<&str> {
+        let both = self.both.into_iter().flatten();
+        let mut reasons = both.map(|one| one.reason.as_str());
+        reasons.find(|reason| !reason.is_empty())
+    }
+
+    /// Why it was lost, if that was by chance.
+    pub(super) fn by_chance(&self) -> Option<String> {
+        let is_ruled = self
             .both
             .into_iter()
             .flatten()
-            .map(|one| one.reason.as_str())
-            .collect();
-        if reasons.contains(&RULED) {
+            .any(|one| one.reason == RULED);
+        let lost = self
+            .lost_for()
+            .filter(|lost| BY_CHANCE.contains(lost) && !is_ruled);
+        lost.map(str::to_owned)
+    }
+
+    /// What is known of the draw behind what a link decided.
+    pub(super) fn draw(&self) -> String {
+        if self
+            .both
+            .into_iter()
+            .flatten()
+            .any(|one| one.reason == RULED)
+        {
             return "none: it is ruled by the scenario".to_owned();
         }
-        let lost = reasons.iter().find(|reason| !reason.is_empty());
-        match lost {
-            Some(reason) if BY_CHANCE.contains(reason) => {
-                format!("of {reason}, whose number is not in the log")
-            }
-            Some(reason) => format!("none: lost for {reason}"),
-            None => self.parts(),
+        match (self.by_chance(), self.lost_for()) {
+            (Some(reason), _) => format!("of {reason}, whose number is not in the log"),
+            (None, Some(reason)) => format!("none: lost for {reason}"),
+            (None, None) => self.parts(),
         }
     }
 

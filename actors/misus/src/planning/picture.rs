@@ -1,6 +1,7 @@
 //! Pictures of a run of planners, drawn from its log alone: what the plan is worth step by step, what became of
 //! goals over time, and the tours that are planned. The same log gives the same bytes.
 
+pub(super) mod account;
 mod history;
 mod score;
 mod states;

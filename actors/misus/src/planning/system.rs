@@ -4,8 +4,8 @@ use farside::Report;
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
-    Recording, Removable, Section, Seeds, Settings, Setup, SetupError, System,
+    Account, Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo,
+    PictureRequest, Recording, Removable, Section, Seeds, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -130,6 +130,21 @@ impl Settings for PlanningScenario {
         let goals = team.shared.instance.goals();
         let assembly = Assembly::new(move |_: &Report| metrics::results(&team));
         Ok(assembly.with_notes(vec![format!("problem: {name}, {goals} goals")]))
+    }
+
+    fn account(
+        &self,
+        actor: &str,
+        run: &dyn Recording,
+        until_ns: Option<u64>,
+        setup: &mut Setup<'_>,
+    ) -> Result<Option<Account>, PictureError> {
+        let seeds = Seeds {
+            run: setup.run_seed,
+            problem: setup.problem_seed,
+        };
+        let shared = shared(self, seeds, setup.files)?;
+        picture::account::account(&shared.rovers, actor, run, until_ns)
     }
 
     fn draw(

@@ -21,7 +21,8 @@ pub(super) struct Parting {
     pub(super) event: Option<Differing>,
     /// The first state that an actor recorded otherwise, if that is before.
     pub(super) state: Option<State>,
-    /// The two events that went in another order before that.
+    /// The two events that went in another order last before that, at the actor that differs first if it has any:
+    /// the likeliest to have decided. That these did, and no swap before them, is not proved.
     pub(super) tie: Option<Tie>,
 }
 

@@ -172,6 +172,10 @@ fn parted(text: &mut String, parting: &Parting) {
         let (first, then) = (&tie.first, &tie.then);
         let _ = writeln!(text, "    {a}: {first}, then {then}");
         let _ = writeln!(text, "    {b}: {then}, then {first}");
+        let _ = writeln!(
+            text,
+            "    (the last swap before what differs first: the likeliest to decide, which is not proved)"
+        );
     }
     if let Some(state) = &parting.state {
         let (at, topic) = (time(state.time_ns), &state.topic);

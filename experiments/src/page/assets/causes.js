@@ -92,7 +92,7 @@ class Causes {
   whatIf(side, row, { cls, link }) {
     if (!side.head.farside || !link || !["lost", "delivered"].includes(cls)) return [];
     const quoted = (text) => (/^[\w./,@+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
-    const at = (side.rows.sent[row] / 1e9).toFixed(9).replace(/\.?0+$/, "") || "0";
+    const at = ((side.rows.sent[row] + begins) / 1e9).toFixed(9).replace(/\.?0+$/, "") || "0";
     const verb = cls === "lost" ? "--deliver" : "--lose";
     const command = `farside fork ${quoted(side.head.path)} --at ${at}s ${verb} ${quoted(side.id(row))} --out fork.mcap`;
     const question = cls === "lost" ? "What if it had arrived?" : "What if it had been lost?";

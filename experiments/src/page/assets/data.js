@@ -51,6 +51,7 @@ function readRows(bytes, told) {
     cause: new Int32Array(n),
     ordinal: new Float64Array(n),
     copy: new Uint16Array(n),
+    differs: new Uint8Array(n),
     detail: null,
     longest: 0,
   };
@@ -78,6 +79,7 @@ function readRows(bytes, told) {
       next[family] = ordinal + 1;
     },
     (number, row) => { rows.copy[row] = number; },
+    (number, row) => { rows.differs[row] = number; },
   ];
   told.columns.forEach((length, column) => {
     eachNumber(bytes, from, length, readers[column]);
@@ -93,7 +95,7 @@ function inOrder(rows) {
   const by = (column) => column.map((_, row) => column[order[row]]);
   return {
     ...rows, flow: by(rows.flow), at: by(rows.at), sent: by(rows.sent), ordinal: by(rows.ordinal),
-    copy: by(rows.copy), detail: order,
+    copy: by(rows.copy), differs: by(rows.differs), detail: order,
   };
 }
 

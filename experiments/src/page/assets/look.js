@@ -152,8 +152,16 @@ function unitOf(span) {
   return ["ns", 1];
 }
 
+/** When the page begins, in nanoseconds since the run's start: times count from there, and are told as of the run. */
+let begins = 0;
+
+function beginAt(ns) {
+  begins = ns;
+}
+
 /** A time with about three digits more than the span that is looked at. */
-function timeText(ns, span) {
+function timeText(sinceBegin, span) {
+  const ns = sinceBegin + begins;
   const [name, unit] = unitOf(span);
   const digits = Math.max(0, Math.min(9, Math.round(Math.log10(unit)), 4 - Math.ceil(Math.log10(span / unit))));
   if (name === "s" && span >= 7200e9) {
@@ -165,7 +173,8 @@ function timeText(ns, span) {
 }
 
 /** A time to the nanosecond, without zeros at its end. */
-function exactTime(ns) {
+function exactTime(sinceBegin) {
+  const ns = sinceBegin + begins;
   const whole = Math.floor(ns / 1e9);
   const rest = String(Math.round(ns - whole * 1e9)).padStart(9, "0").replace(/0+$/, "");
   return `${whole}${rest ? `.${rest}` : ""} s`;
@@ -201,10 +210,10 @@ function ticks(from, until, about) {
 function timeTicks(from, until, about) {
   const span = until - from;
   const [name, unit] = span >= 20 * 86400e9 ? ["d", 86400e9] : span >= 7200e9 ? ["h", 3600e9] : unitOf(span);
-  const all = ticks(from / unit, until / unit, about);
+  const all = ticks((from + begins) / unit, (until + begins) / unit, about);
   const step = all.length > 1 ? all[1] - all[0] : 1;
   const digits = Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9)));
-  return all.map((at) => ({ at: at * unit, text: `${at.toFixed(digits)} ${name}` }));
+  return all.map((at) => ({ at: at * unit - begins, text: `${at.toFixed(digits)} ${name}` }));
 }
 
 /** All that draws, for when there is no next frame: on paper. */

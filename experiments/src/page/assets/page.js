@@ -14,6 +14,8 @@ class State {
     this.selected = null;
     this.causes = { chain: [], unknown: false };
     this.passes = sides.map((side) => new Uint8Array(side.flows.length).fill(1));
+    /** Nothing but what differs between two logs is shown. */
+    this.onlyDiffering = false;
     /** By actor, from when on what it says or does differs; empty for one log. */
     this.reached = new Map();
     this.listeners = new Map();
@@ -85,7 +87,7 @@ class State {
     this.tell("select");
   }
 
-  /** The next row before or after a time, or a row, that the chart shows and whose flow fits. */
+  /** The next row before or after a time, or a row, that the chart shows and that fits. */
   nextRow(from, direction, fits, fromRow = false) {
     const { rows } = this.side;
     const passes = this.passes[this.index];
@@ -93,7 +95,7 @@ class State {
     // At the time of the slider itself a row counts as passed.
     while (!fromRow && direction > 0 && row < rows.n && rows.at[row] <= from) row += 1;
     for (; row >= 0 && row < rows.n; row += direction) {
-      if (passes[rows.flow[row]] && fits(rows.flow[row])) return row;
+      if (passes[rows.flow[row]] && fits(row) && (!this.onlyDiffering || rows.differs[row])) return row;
     }
     return -1;
   }
@@ -101,9 +103,20 @@ class State {
   /** The next loss, whether or not the chart shows losses. */
   toLoss(direction) {
     const { side } = this;
+    this.toNext(direction, (row) => side.flow(row).cls === "lost");
+  }
+
+  /** The next message that the other log has otherwise. */
+  toDifference(direction) {
+    const { rows } = this.side;
+    this.toNext(direction, (row) => rows.differs[row] === 1);
+  }
+
+  toNext(direction, fits) {
+    const { side } = this;
     const chosen = this.selected?.side === this.index && this.selected.row;
     const start = typeof chosen === "number" ? chosen : null;
-    const row = this.nextRow(start ?? this.time, direction, (flow) => side.flows[flow].cls === "lost", start !== null);
+    const row = this.nextRow(start ?? this.time, direction, fits, start !== null);
     if (row < 0) return;
     // Near enough that it is seen by itself.
     const wanted = this.until * Math.min(0.02, SEEN / Math.max(1, side.rows.n));
@@ -123,6 +136,8 @@ function keys(state, timeline) {
     ".": () => timeline.toEvent(1),
     l: () => state.toLoss(1),
     L: () => state.toLoss(-1),
+    d: () => state.toDifference(1),
+    D: () => state.toDifference(-1),
     "+": () => state.zoom(0.5),
     "-": () => state.zoom(2),
     0: () => state.setView(0, state.until),
@@ -144,6 +159,14 @@ function buttons(state) {
   click("whole", () => state.setView(0, state.until));
   click("loss-before", () => state.toLoss(-1));
   click("loss-after", () => state.toLoss(1));
+  if (state.sides.length > 1) {
+    click("difference-before", () => state.toDifference(-1));
+    click("difference-after", () => state.toDifference(1));
+    byId("differing").addEventListener("change", () => {
+      state.onlyDiffering = byId("differing").checked;
+      state.tell("view");
+    });
+  }
   const lost = state.sides.some((side) => side.told.counts.lost);
   for (const id of ["loss-before", "loss-after"]) byId(id).hidden = !lost;
   for (const input of document.getElementsByName("side")) {
@@ -182,6 +205,7 @@ function complain(error) {
 
 async function start() {
   const { sides: heads, diff } = await jsonOf("head");
+  beginAt(heads[0].from_ns);
   const sides = heads.map((head, index) => new Side("ab"[index], head));
   introduce(sides);
   const state = new State(sides);

@@ -9,6 +9,9 @@ const AXIS = 26;
 /** How wide a time is for which rows are counted together. */
 const CELL = 4;
 
+/** The colour of what differs between two logs. */
+const DIFFERS = "--s3";
+
 /** What can be shown or not, and which classes that is. */
 const FATES = [
   ["delivered", ["delivered", "message"], true],
@@ -116,7 +119,13 @@ class Sequence {
       const count = this.state.sides.map((side) => (side.told.counts[cls] ?? 0).toLocaleString("en")).join(" / ");
       return element("li", {}, mark, ` ${name}: ${count}`);
     };
-    byId("legend").replaceChildren(...Object.entries(CLASSES).filter(([cls]) => used.has(cls)).map(entry));
+    const entries = Object.entries(CLASSES).filter(([cls]) => used.has(cls)).map(entry);
+    if (this.state.sides.length > 1) {
+      const mark = element("span", { class: "sign", style: `color: var(${DIFFERS})`, "aria-hidden": "true" }, "○");
+      const count = this.state.sides.map((side) => side.told.differing.toLocaleString("en")).join(" / ");
+      entries.push(element("li", { id: "differing-count" }, mark, ` differs: ${count}`));
+    }
+    byId("legend").replaceChildren(...entries);
   }
 
   // --- Where it is ---------------------------------------------------------------------------------------------
@@ -150,6 +159,11 @@ class Sequence {
 
   // --- Drawing -------------------------------------------------------------------------------------------------
 
+  /** Whether a row is shown, as far as differences decide. */
+  isWanted(row) {
+    return !this.state.onlyDiffering || this.state.side.rows.differs[row] === 1;
+  }
+
   /** The rows that are shown in a span of time: how many, and with a list as long as there are few. */
   shown() {
     const { rows } = this.state.side;
@@ -159,14 +173,14 @@ class Sequence {
     let count = 0;
     const last = rowAfter(rows, to);
     for (let row = rowFrom(rows, from); row < last; row++) {
-      if (!passes[rows.flow[row]]) continue;
+      if (!passes[rows.flow[row]] || !this.isWanted(row)) continue;
       if (count < SINGLE) list.push(row);
       count += 1;
     }
     // Sent within, and not there before its end.
     const end = Math.min(rows.n, rowFrom(rows, to + rows.longest) + 1);
     for (let row = last; row < end; row++) {
-      if (!passes[rows.flow[row]] || rows.sent[row] > to || count >= SINGLE) continue;
+      if (!passes[rows.flow[row]] || !this.isWanted(row) || rows.sent[row] > to || count >= SINGLE) continue;
       list.push(row);
     }
     return { list, count };
@@ -252,6 +266,7 @@ class Sequence {
     const isMessage = ["delivered", "lost", "in_flight"].includes(flow.cls) && from >= 0 && from !== to;
     if (!isMessage) {
       if (to < 0 && EVENTS.includes(flow.cls)) return;
+      if (rows.differs[row]) this.markDiffering(pen, x1, y1, x1, y1);
       drawSign(pen, flow.cls, x1, y1);
       this.marks.push({ row, x: x1, y: y1 });
       return;
@@ -261,6 +276,7 @@ class Sequence {
     // A loss ends before its receiver.
     const share = flow.cls === "lost" ? 0.6 : 1;
     const y = y0 + (y1 - y0) * share;
+    if (rows.differs[row]) this.markDiffering(pen, x0, y0, x1, y);
     pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1, y); pen.stroke();
     pen.setLineDash([]);
     if (flow.cls === "delivered") {
@@ -274,6 +290,21 @@ class Sequence {
     this.marks.push({ row, x: x1, y });
   }
 
+  /** What the other log has otherwise stands out: a band behind its arrow, and a ring about its end. */
+  markDiffering(pen, x0, y0, x1, y1) {
+    pen.save();
+    pen.setLineDash([]);
+    pen.strokeStyle = colour(DIFFERS);
+    pen.lineCap = "round";
+    pen.globalAlpha = 0.35;
+    pen.lineWidth = 6;
+    pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1, y1); pen.stroke();
+    pen.globalAlpha = 1;
+    pen.lineWidth = 1.6;
+    pen.beginPath(); pen.arc(x1, y1, 7, 0, 7); pen.stroke();
+    pen.restore();
+  }
+
   /** Counts by lane and time: the darker the more, and a cross where something was lost. */
   drawCounts(pen) {
     const { side, from, to } = this.state;
@@ -282,15 +313,17 @@ class Sequence {
     const columns = Math.max(1, Math.ceil((this.width - this.left) / CELL));
     const lanes = this.lanes.length;
     const [arrived, lost] = [new Uint32Array(columns * lanes), new Uint32Array(columns * lanes)];
+    const differs = new Uint8Array(columns * lanes);
     const scale = (this.width - this.left - 8) / (to - from) / CELL;
     const last = rowAfter(rows, to);
     const signs = [];
     for (let row = rowFrom(rows, from); row < last; row++) {
       const flow = rows.flow[row];
-      if (!passes[flow]) continue;
+      if (!passes[flow] || !this.isWanted(row)) continue;
       const column = Math.min(columns - 1, Math.floor((rows.at[row] - from) * scale));
       const { cls } = side.flows[flow];
       const [sender, receiver] = this.laneOf[flow];
+      if (rows.differs[row] && receiver >= 0) differs[receiver * columns + column] = 1;
       if (cls === "lost") { if (sender >= 0) lost[sender * columns + column] += 1; }
       else if (EVENTS.includes(cls) && cls !== "start") signs.push(row);
       else if (receiver >= 0) arrived[receiver * columns + column] += 1;
@@ -308,6 +341,13 @@ class Sequence {
       }
     }
     pen.globalAlpha = 1;
+    // What differs between two logs has a line beneath it.
+    pen.fillStyle = colour(DIFFERS);
+    for (const lane of lanesSeen) {
+      for (let column = 0; column < columns; column++) {
+        if (differs[lane * columns + column]) pen.fillRect(this.left + column * CELL, this.y(lane) + this.lane / 2 - 3, CELL, 3);
+      }
+    }
     pen.strokeStyle = colour("--s1");
     for (const lane of lanesSeen) {
       for (let column = 0; column < columns; column++) {
@@ -331,7 +371,7 @@ class Sequence {
   addCounted(arrived, lost, columns, scale) {
     const { side, from, to } = this.state;
     const { told } = side;
-    if (!told.left_out || to < told.first_left_out_ns || byId("kinds").value || byId("reasons").value) return;
+    if (this.state.onlyDiffering || !told.left_out || to < told.first_left_out_ns || byId("kinds").value || byId("reasons").value) return;
     const { width_ns: width, lanes } = told.bins;
     for (const [name, bins] of Object.entries(lanes)) {
       const lane = this.laneOfName.get(told.names[name]);
@@ -441,7 +481,7 @@ class Sequence {
     let best = -1;
     const last = rowAfter(rows, time + reach);
     for (let row = rowFrom(rows, time - reach); row < last; row++) {
-      if (!passes[rows.flow[row]] || !fits(rows.flow[row])) continue;
+      if (!passes[rows.flow[row]] || !fits(rows.flow[row]) || !this.isWanted(row)) continue;
       if (best < 0 || Math.abs(rows.at[row] - time) < Math.abs(rows.at[best] - time)) best = row;
     }
     return best;
@@ -523,7 +563,7 @@ class Sequence {
       return;
     }
     const lane = chosen < 0 ? -1 : this.laneOf[rows.flow[chosen]][1];
-    const row = state.nextRow(chosen < 0 ? state.time : chosen, step, (flow) => lane < 0 || this.laneOf[flow].includes(lane), chosen >= 0);
+    const row = state.nextRow(chosen < 0 ? state.time : chosen, step, (row) => lane < 0 || this.laneOf[rows.flow[row]].includes(lane), chosen >= 0);
     if (row >= 0) state.select(state.index, row);
   }
 

@@ -108,7 +108,7 @@ fn compared(a: &Run, b: &Run, chunk: usize) -> DiffReport {
     b.write(&paths[1], chunk + 2);
     let compare = |limits| {
         let options = DiffOptions::default();
-        comparison::compare(&paths[0], &paths[1], &options, limits)
+        comparison::compare(&paths[0], &paths[1], &options, limits, None)
             .unwrap()
             .0
     };
@@ -118,6 +118,7 @@ fn compared(a: &Run, b: &Run, chunk: usize) -> DiffReport {
         pairs: 2,
         message_bytes: 1,
         passes_front: false,
+        ..Limits::default()
     };
     assert_eq!(report, compare(little));
     report

@@ -7,7 +7,7 @@ use super::Comparison;
 use crate::LogError;
 use crate::diff::entry::{self, Entry, Mode};
 use crate::diff::found::{Found, Pair, Places};
-use crate::diff::matching::{self, Sequence};
+use crate::diff::matching::{self, Sequence, Shifts};
 use crate::diff::spill::{BUCKETS, Buckets, Fixed};
 use crate::diff::{aligning, detail};
 
@@ -57,17 +57,27 @@ impl Comparison<'_> {
 
     /// Pairs what has but a place in its flow and is said otherwise in the two logs.
     pub(super) fn compare_places(&mut self) -> Result<(), LogError> {
-        let mut shifts = std::mem::take(&mut self.shifts);
+        let mut shifts = std::mem::replace(&mut self.shifts, Shifts::new(0));
         shifts.sort();
+        let mut is_left = false;
         let mut placed = Buckets::new(self.limits.left());
         for bucket in 0..BUCKETS {
             for entry in self.left.1.read(bucket)? {
                 let key = entry.place_key(shifts.place_in_a(&entry));
+                is_left = true;
                 placed.push(entry::bucket_of(key), entry)?;
             }
             self.note_usage(placed.held_bytes());
         }
         self.left.1 = Buckets::new(self.limits.left());
+        if shifts.forgotten > 0 && is_left {
+            self.report.notes.push(format!(
+                "{} messages have another place in their flow, of which {} are kept in mind: of what is said \
+                 otherwise behind the others, a message may stand beside a wrong one",
+                self.limits.shifted as u64 + shifts.forgotten,
+                self.limits.shifted
+            ));
+        }
         for bucket in 0..BUCKETS {
             let (a, b) = (self.left.0.read(bucket)?, placed.read(bucket)?);
             let found = matching::by_place(&a, &b, &shifts);
