@@ -26,9 +26,16 @@ impl Carrier for Noting {
 
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
         let mut seen = self.seen.lock().unwrap();
-        for purpose in [Purpose::Loss, Purpose::Burst, Purpose::Corrupt, Purpose::BitErrors] {
+        for purpose in [
+            Purpose::Loss,
+            Purpose::Burst,
+            Purpose::Corrupt,
+            Purpose::BitErrors,
+        ] {
             let purpose = purpose as u64;
-            for (copy, attempt) in (0..2).flat_map(|copy| (0..4).map(move |attempt| (copy, attempt))) {
+            for (copy, attempt) in
+                (0..2).flat_map(|copy| (0..4).map(move |attempt| (copy, attempt)))
+            {
                 let drew = parcel.random(purpose, attempt, copy).uniform();
                 seen.insert((parcel.ordinal(), copy, attempt, purpose), drew);
             }
@@ -59,9 +66,14 @@ fn params() -> impl Strategy<Value = LinkParams> {
         }),
     ];
     let rate = prop_oneof![Just(None), (20_000..400_000u64).prop_map(Some)];
-    let chances = (chance(), chance(), chance(), prop_oneof![Just(0.0), Just(1e-3)]);
-    (chances, burst, rate, 0..3u32).prop_map(|((loss, corrupt, duplicate, ber), burst, rate, retries)| {
-        LinkParams {
+    let chances = (
+        chance(),
+        chance(),
+        chance(),
+        prop_oneof![Just(0.0), Just(1e-3)],
+    );
+    (chances, burst, rate, 0..3u32).prop_map(
+        |((loss, corrupt, duplicate, ber), burst, rate, retries)| LinkParams {
             loss,
             corrupt,
             duplicate,
@@ -71,8 +83,8 @@ fn params() -> impl Strategy<Value = LinkParams> {
             retries,
             overhead: 7,
             ..LinkParams::default()
-        }
-    })
+        },
+    )
 }
 
 proptest! {
@@ -146,7 +158,10 @@ fn where_it_cannot_be_known_the_reason_is_told() {
     for (text, part) in [
         ("mtu = '100B'", "followed through windows"),
         ("radio = 'uhf'", "a radio"),
-        ("retries = 2\ncontacts = [{ start = '0s', end = '1s' }]", "closed link"),
+        (
+            "retries = 2\ncontacts = [{ start = '0s', end = '1s' }]",
+            "closed link",
+        ),
     ] {
         let timeline = Timeline::new(toml::from_str::<LinkParams>(text).unwrap());
         let error = timeline.redrawn(LOSS, &of).unwrap_err();
@@ -157,6 +172,16 @@ fn where_it_cannot_be_known_the_reason_is_told() {
         carriage: Some(Carriage::default()),
         ..of
     };
-    assert!(plain.redrawn(LOSS, &never).unwrap_err().contains("never on the air"));
-    assert!(plain.redrawn("outage", &of).unwrap_err().contains("nothing is drawn"));
+    assert!(
+        plain
+            .redrawn(LOSS, &never)
+            .unwrap_err()
+            .contains("never on the air")
+    );
+    assert!(
+        plain
+            .redrawn("outage", &of)
+            .unwrap_err()
+            .contains("nothing is drawn")
+    );
 }
