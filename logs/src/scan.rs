@@ -189,7 +189,7 @@ impl Scanner {
     pub(crate) fn next(&mut self) -> Result<Option<Item<'_>>, LogError> {
         loop {
             if self.next_inner < self.chunk.len() {
-                match self.inner() {
+                match self.inner::<false>() {
                     Ok(Found::Other) => continue,
                     Ok(Found::Message(head, position)) => {
                         self.last = Some((head, position, Within::Chunk));
@@ -322,7 +322,7 @@ impl Scanner {
             }
         }
         self.next_inner = (position.inner as usize).min(self.chunk.len());
-        let found = match self.inner() {
+        let found = match self.inner::<true>() {
             Ok(Found::Message(head, position)) => Some((head, position)),
             _ => None,
         };
@@ -417,9 +417,9 @@ impl Scanner {
         opened
     }
 
-    /// Handles the next record of the open chunk.
+    /// Handles the next record of the open chunk. If it is asked for by its place, it is not passed over.
     #[inline]
-    fn inner(&mut self) -> Result<Found, String> {
+    fn inner<const BY_PLACE: bool>(&mut self) -> Result<Found, String> {
         const CUT: &str = "a chunk that ends within a record";
         let start = self.next_inner;
         let rest = &self.chunk[start..];
@@ -432,8 +432,8 @@ impl Scanner {
             op::MESSAGE => {
                 let head = message_header(content).ok_or_else(malformed)?;
                 let is_looked_at = match self.declared.slot(head.channel_id) {
-                    Some(slot) if slot.is_passed_over => return Ok(Found::Other),
-                    Some(slot) => slot.is_looked_at,
+                    Some(slot) if slot.is_passed_over && !BY_PLACE => return Ok(Found::Other),
+                    Some(slot) => slot.is_looked_at && !BY_PLACE,
                     None => return Ok(Found::Stray(undeclared(head.channel_id))),
                 };
                 let inner = u32::try_from(start).map_err(|_| malformed())?;

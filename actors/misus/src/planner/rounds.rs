@@ -230,19 +230,30 @@ impl Team {
         }
     }
 
-    /// Takes goals out of plans for which too few rovers have found room.
+    /// Takes goals out of plans for which too few rovers have found room. A rover that has to do something
+    /// mandatory may then have no room for another goal for two, which its partner takes out in turn.
     fn part(&mut self, instance: &Instance) -> Result<(), Unmet> {
+        loop {
+            let holders = self.holders(instance);
+            let stays = |goal: usize| holders[goal] >= instance.task(goal).rovers;
+            let mut rovers = self.rovers.iter_mut();
+            rovers.try_for_each(|rover| rover.part(instance, stays))?;
+            let left = self.holders(instance);
+            let whole = |goal: usize| left[goal] == 0 || left[goal] >= instance.task(goal).rovers;
+            if (0..instance.goals()).all(whole) {
+                return Ok(());
+            }
+        }
+    }
+
+    /// By goal: how many rovers have it in their plans.
+    fn holders(&self, instance: &Instance) -> Vec<u32> {
         let mut holders = vec![0; instance.goals()];
         for rover in &self.rovers {
-            rover
-                .plan()
-                .goals(instance)
-                .for_each(|goal| holders[goal] += 1);
+            let goals = rover.plan().goals(instance);
+            goals.for_each(|goal| holders[goal] += 1);
         }
-        let mut rovers = self.rovers.iter_mut();
-        rovers.try_for_each(|rover| {
-            rover.part(instance, |goal| holders[goal] >= instance.task(goal).rovers)
-        })
+        holders
     }
 
     /// What the plans of all are worth.
