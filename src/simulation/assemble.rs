@@ -237,7 +237,8 @@ impl Simulation {
                 continue;
             }
             // It is the type's own `Deserialize` that shows what is in it.
-            // A part of a run that was: whether its types come back was tried as it started.
+            // A part of a run that was, and of types that were tried as it started. Whoever has changed
+            // them since hears of it at the next run.
             let trace = match self.live {
                 None => entry.trace,
                 Some(_) => entry.trace_untried,

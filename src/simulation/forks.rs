@@ -7,7 +7,8 @@ use crate::time::SimTime;
 
 impl Simulation {
     /// Decides what becomes of a message that goes through a link, whatever the link decides. Of several
-    /// rulings on one message, whichever of its names they use, each sees what the one before has left. What came of them is in
+    /// rulings on one message, whichever of its names they use, each sees what the one before has left.
+    /// What came of them is in
     /// [`Report::rulings`](crate::Report::rulings), in the order in which they were declared.
     ///
     /// ```
