@@ -68,6 +68,7 @@ mod names;
 mod registry;
 mod samples;
 mod schema;
+mod subject;
 mod symmetry;
 mod trace;
 mod wire;

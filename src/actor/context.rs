@@ -146,7 +146,8 @@ impl<'a, A: Actor> Context<'a, A> {
         A: Handler<M>,
     {
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
-            self.not_listed::<M>(self.me());
+            let me = self.me();
+            self.parts.not_listed(me, std::any::type_name::<M>());
             return TimerId {
                 owner: self.parts.topology.owner,
                 slot: u32::MAX,
@@ -369,7 +370,8 @@ impl<'a, A: Actor> Context<'a, A> {
         }
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
             let receiver = self.parts.topology.declared[target.declared() as usize];
-            return self.not_listed::<M>(receiver);
+            let kind = std::any::type_name::<M>();
+            return self.parts.not_listed(receiver, kind);
         };
         let (me, declared) = (self.me(), target.declared());
         let outbound = |letter| Outbound {
@@ -392,13 +394,6 @@ impl<'a, A: Actor> Context<'a, A> {
     fn of_another_simulation(&mut self, what: &'static str, number: u32) {
         self.parts
             .raise(FaultCause::OtherSimulation { what, number });
-    }
-
-    #[cold]
-    fn not_listed<M>(&mut self, receiver: EntityId) {
-        let receiver = self.parts.topology.name(receiver).to_owned();
-        let kind = std::any::type_name::<M>().to_owned();
-        self.parts.raise(FaultCause::NotListed { receiver, kind });
     }
 }
 

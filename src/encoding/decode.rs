@@ -64,7 +64,6 @@ pub(super) fn decode<T: DeserializeOwned>(
     flat: &FlatSchema,
     bytes: &[u8],
 ) -> Result<T, DecodeError> {
-    let message = || flat.messages[0].name.clone();
     // Each new start knows one more required field, and they are remembered from then on.
     let fields: usize = flat
         .messages
@@ -85,26 +84,21 @@ pub(super) fn decode<T: DeserializeOwned>(
         match T::deserialize(root) {
             Ok(value) => return Ok(value),
             Err(Fault::Again) => {}
-            Err(Fault::Error(error)) => return Err(*error),
-            Err(Fault::Custom(reason)) => {
-                return Err(DecodeError::Custom {
-                    message: message(),
-                    reason,
-                });
-            }
-            Err(Fault::Missing(field)) => {
-                let reason = format!("missing field `{field}`");
-                return Err(DecodeError::Custom {
-                    message: message(),
-                    reason,
-                });
-            }
+            Err(fault) => return Err(refused(flat, fault)),
         }
     }
-    Err(DecodeError::Custom {
-        message: message(),
-        reason: Fault::Again.to_string(),
-    })
+    Err(refused(flat, Fault::Again))
+}
+
+#[cold]
+fn refused(flat: &FlatSchema, fault: Fault) -> DecodeError {
+    match fault {
+        Fault::Error(error) => *error,
+        fault => DecodeError::Custom {
+            message: flat.messages[0].name.clone(),
+            reason: fault.to_string(),
+        },
+    }
 }
 
 /// Where a value comes from.
@@ -132,15 +126,19 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
         }
     }
 
+    fn mismatch<T>(&self, actual: &str) -> Result<T, Fault> {
+        Err(self.mismatched(actual))
+    }
+
     #[cold]
     #[inline(never)]
-    fn mismatch<T>(&self, actual: &str) -> Result<T, Fault> {
-        Err(DecodeError::Mismatch {
+    fn mismatched(&self, actual: &str) -> Fault {
+        DecodeError::Mismatch {
             place: self.field.place.clone(),
             expected: self.flat.describe(self.field, self.expect()),
             actual: actual.to_owned(),
         }
-        .into())
+        .into()
     }
 
     /// Takes the one value of a field of the given kind; protobuf lets the last one win.
@@ -280,16 +278,23 @@ fn read_struct<'b, V: Visitor<'b>>(
     visitor: V,
 ) -> Result<V::Value, Fault> {
     let message = reader.message;
-    match visitor.visit_map(Members::new(&mut reader)) {
-        Err(Fault::Missing(name)) => {
-            match message.fields.iter().find(|field| field.key.name == name) {
-                Some(field) if !field.required.swap(true, Ordering::Relaxed) => Err(Fault::Again),
-                // Another thread may have been faster.
-                Some(_) => Err(Fault::Again),
-                None => Err(Fault::Missing(name)),
-            }
+    let read = visitor.visit_map(Members::new(&mut reader));
+    read.map_err(|fault| learn_required(message, fault))
+}
+
+/// A field that a struct cannot do without is required from now on.
+#[cold]
+fn learn_required(message: &Message, fault: Fault) -> Fault {
+    let Fault::Missing(name) = fault else {
+        return fault;
+    };
+    match message.fields.iter().find(|field| field.key.name == name) {
+        Some(field) => {
+            // Another thread may have been faster.
+            field.required.store(true, Ordering::Relaxed);
+            Fault::Again
         }
-        other => other,
+        None => Fault::Missing(name),
     }
 }
 

@@ -1,6 +1,5 @@
 //! What the tracer knows between its passes, and the choices that follow from it.
 
-use std::any::type_name;
 use std::collections::BTreeMap;
 
 use super::error::SchemaError;
@@ -214,7 +213,12 @@ impl Registry {
     }
 
     /// Finds or adds a container.
-    pub(super) fn container<V>(&mut self, name: &'static str, body: Body) -> Result<usize, Halt> {
+    pub(super) fn container(
+        &mut self,
+        type_name: &'static str,
+        name: &'static str,
+        body: Body,
+    ) -> Result<usize, Halt> {
         let kind = match &body {
             Body::Fields(Fields::Unit) => 0,
             Body::Fields(Fields::Newtype(_)) => 1,
@@ -222,7 +226,6 @@ impl Registry {
             Body::Fields(Fields::Struct(..)) => 3,
             Body::Enum(_) => 4,
         };
-        let type_name = type_name::<V>();
         if let Some(&id) = self.identities.get(&(type_name, name, kind)) {
             let same = match (&self.containers[id].body, &body) {
                 (Body::Fields(a), Body::Fields(b)) => a.alike(b),
@@ -347,6 +350,33 @@ impl Registry {
                 Ok(())
             }
             Err((old, new)) => Err(self.conflict(&old, &new)),
+        }
+    }
+
+    /// Ends a field that was read.
+    pub(super) fn close(&mut self, slot: Slot, format: Format) -> Result<(), Halt> {
+        let learned = self.learn(slot, format);
+        self.trail.pop();
+        learned
+    }
+
+    /// Ends a field at which a pass ends: what was learned of it is noted all the same.
+    pub(super) fn close_halted(
+        &mut self,
+        slot: Slot,
+        format: Format,
+        site: u64,
+        halt: Halt,
+    ) -> Halt {
+        let halt = self.halted(site, halt);
+        self.close(slot, format).err().unwrap_or(halt)
+    }
+
+    /// What becomes of an end of a pass at the place that gave out the sample.
+    pub(super) fn halted(&mut self, site: u64, halt: Halt) -> Halt {
+        match halt {
+            Halt::Refused(reason) => self.refuse(site, reason),
+            other => other,
         }
     }
 

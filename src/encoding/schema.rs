@@ -11,6 +11,7 @@ use super::error::{DecodeError, EncodeError, SchemaError};
 use super::flat::FlatSchema;
 use crate::guard::dropped;
 
+use super::subject::{Subject, Value};
 use super::{decode, descriptor, encode, lower, symmetry, trace, wire};
 
 /// The protobuf package of every message kind.
@@ -57,20 +58,21 @@ impl Schema {
     /// assert!(matches!(error, SchemaError::NotAContainer { .. }));
     /// ```
     pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
-        let (schema, mut traced) = Schema::traced::<T>()?;
+        Schema::tried(&Subject::of::<T>())
+    }
+
+    fn tried(subject: &Subject) -> Result<Schema, SchemaError> {
+        let (schema, mut traced) = Schema::traced(subject)?;
         // A study builds the same simulation a thousand times.
         static CHECKED: Mutex<BTreeSet<TypeId>> = Mutex::new(BTreeSet::new());
         let checked = || CHECKED.lock().unwrap_or_else(PoisonError::into_inner);
-        let id = TypeId::of::<T>();
-        if !checked().contains(&id) {
-            let filled = traced.filled();
-            let symmetric = symmetry::check(&schema.flat, &traced.values, &filled);
-            for sample in traced.values.into_iter().chain(filled) {
-                // What panics with a sample need not with what a run has.
-                let _ = dropped(sample);
-            }
+        if !checked().contains(&subject.id) {
+            let filled = traced.filled(subject);
+            let symmetric =
+                symmetry::check(subject.type_name, &schema.flat, &traced.values, &filled);
+            drop_samples(traced.values.into_iter().chain(filled));
             symmetric?;
-            checked().insert(id);
+            checked().insert(subject.id);
         }
         Ok(schema)
     }
@@ -78,15 +80,13 @@ impl Schema {
     /// The same, without trying whether values come back: for what starts no run, but goes through one again.
     pub(crate) fn untried<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError>
     {
-        let (schema, traced) = Schema::traced::<T>()?;
-        for sample in traced.values {
-            let _ = dropped(sample);
-        }
+        let (schema, traced) = Schema::traced(&Subject::of::<T>())?;
+        drop_samples(traced.values.into_iter());
         Ok(schema)
     }
 
-    fn traced<T: DeserializeOwned>() -> Result<(Schema, trace::Traced<T>), SchemaError> {
-        let traced = trace::trace::<T>()?;
+    fn traced(subject: &Subject) -> Result<(Schema, trace::Traced), SchemaError> {
+        let traced = trace::trace(subject)?;
         let schema = Schema {
             name: traced.registry.containers[traced.root].name,
             flat: lower::lower(&traced.registry.containers, traced.root),
@@ -154,5 +154,12 @@ impl Schema {
     /// default, or as protobuf's zero where the type has none.
     pub fn decode<T: DeserializeOwned>(&self, bytes: &[u8]) -> Result<T, DecodeError> {
         decode::decode(&self.flat, bytes)
+    }
+}
+
+fn drop_samples(samples: impl Iterator<Item = Box<dyn Value>>) {
+    for sample in samples {
+        // What panics with a sample need not with what a run has.
+        let _ = dropped(sample);
     }
 }

@@ -2,17 +2,13 @@
 //! comes back. Types of messages need not be comparable, so that both are looked at through
 //! what they write.
 
-use std::any::type_name;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-
 use super::error::{EncodeError, SchemaError};
 use super::flat::{Field, FlatSchema, Shape, ValueType};
+use super::subject::Value;
 use super::wire::take_field;
-use super::{decode, encode};
 use crate::guard::{dropped, guarded};
 
 /// A field, by its message and its place there.
@@ -26,18 +22,19 @@ struct Written {
 }
 
 /// Checks values that were read while the type was traced, and others in which everything is there.
-pub(super) fn check<T: Serialize + DeserializeOwned>(
+pub(super) fn check(
+    type_name: &str,
     flat: &FlatSchema,
-    met: &[T],
-    filled: &[T],
+    met: &[Box<dyn Value>],
+    filled: &[Box<dyn Value>],
 ) -> Result<(), SchemaError> {
     let check = Check { flat };
     let refused = |reason: String| SchemaError::Asymmetric {
-        type_name: type_name::<T>().to_owned(),
+        type_name: type_name.to_owned(),
         reason,
     };
     for value in met.iter().chain(filled) {
-        check.comes_back(value).map_err(refused)?;
+        check.comes_back(&**value).map_err(refused)?;
     }
     check.all_is_written(filled).map_err(refused)?;
     for (id, message) in flat.messages.iter().enumerate() {
@@ -54,12 +51,12 @@ struct Check<'a> {
 
 impl Check<'_> {
     /// Writes a value. None if the type itself refuses to, as it may with samples.
-    fn write<T: Serialize>(&self, value: &T) -> Result<Option<Written>, String> {
+    fn write(&self, value: &dyn Value) -> Result<Option<Written>, String> {
         self.fields().for_each(|(_, field)| {
             field.left_out.store(false, Ordering::Relaxed);
         });
         let mut bytes = Vec::new();
-        match guarded(|| encode::encode_noting(self.flat, value, &mut bytes)) {
+        match guarded(|| value.encode_noting(self.flat, &mut bytes)) {
             Ok(Ok(())) => {}
             // A panic as well: samples are no values that a run has.
             Ok(Err(EncodeError::Custom(_))) | Err(_) => return Ok(None),
@@ -81,15 +78,15 @@ impl Check<'_> {
     }
 
     /// What was read of a written value is written again as it was.
-    fn comes_back<T: Serialize + DeserializeOwned>(&self, value: &T) -> Result<(), String> {
+    fn comes_back(&self, value: &dyn Value) -> Result<(), String> {
         let Some(written) = self.write(value)? else {
             return Ok(());
         };
-        let Ok(read) = guarded(|| decode::decode::<T>(self.flat, &written.bytes)) else {
+        let Ok(read) = guarded(|| value.decode_another(self.flat, &written.bytes)) else {
             return Ok(());
         };
         let read = read.map_err(|error| error.to_string())?;
-        let again = self.write(&read);
+        let again = self.write(&*read);
         let _ = dropped(read);
         let Some(again) = again? else {
             return Ok(());
@@ -108,10 +105,10 @@ impl Check<'_> {
     }
 
     /// Every field of a struct is written for some value in which everything is there.
-    fn all_is_written<T: Serialize>(&self, filled: &[T]) -> Result<(), String> {
+    fn all_is_written(&self, filled: &[Box<dyn Value>]) -> Result<(), String> {
         let (mut present, mut met) = (BTreeSet::new(), BTreeSet::new());
         for value in filled {
-            if let Some(written) = self.write(value)? {
+            if let Some(written) = self.write(&**value)? {
                 self.note(0, &written.bytes, &mut present, &mut met);
             }
         }
@@ -129,27 +126,23 @@ impl Check<'_> {
     }
 
     /// What `Deserialize` takes where fields of this message are missing comes back as well.
-    fn defaults_come_back<T: Serialize + DeserializeOwned>(
-        &self,
-        id: usize,
-        filled: &[T],
-    ) -> Result<(), String> {
+    fn defaults_come_back(&self, id: usize, filled: &[Box<dyn Value>]) -> Result<(), String> {
         /// Defaults seldom hang on the fields beside them.
         const VALUES: usize = 2;
         for value in filled.iter().take(VALUES) {
-            let Some(written) = self.write(value)? else {
+            let Some(written) = self.write(&**value)? else {
                 continue;
             };
             self.flat.messages[id]
                 .withheld
                 .store(true, Ordering::Relaxed);
-            let read = guarded(|| decode::decode::<T>(self.flat, &written.bytes));
+            let read = guarded(|| value.decode_another(self.flat, &written.bytes));
             self.flat.messages[id]
                 .withheld
                 .store(false, Ordering::Relaxed);
             // A type that validates may have no use for its own defaults.
             if let Ok(Ok(read)) = read {
-                let checked = self.comes_back(&read);
+                let checked = self.comes_back(&*read);
                 let _ = dropped(read);
                 checked?;
             }

@@ -8,17 +8,18 @@
 use std::any::type_name;
 use std::fmt;
 
-use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Visitor};
+use serde::de::{self, DeserializeSeed, IntoDeserializer, Visitor};
 
 use super::error::SchemaError;
 use super::format::{Body, Container, Fields, Format, Variant, merge};
 use super::registry::{Halt, INFINITE, Registry, Slot};
 use super::samples::{Sample, mix};
+use super::subject::{Subject, Value};
 use crate::guard::guarded;
 
 mod access;
 
-use access::{CollectionAccess, FieldAccess, TupleAccess, VariantChoice};
+use access::{CollectionAccess, FieldAccess, Room, TupleAccess, VariantChoice};
 
 /// More passes than any sensible type needs.
 const MAX_PASSES: usize = 10_000;
@@ -26,14 +27,14 @@ const MAX_PASSES: usize = 10_000;
 const MAX_VALUES: usize = 256;
 
 /// The shape of a type, and values that were read on the way.
-pub(super) struct Traced<T> {
+pub(super) struct Traced {
     pub(super) registry: Registry,
     pub(super) root: usize,
-    pub(super) values: Vec<T>,
+    pub(super) values: Vec<Box<dyn Value>>,
 }
 
 /// Traces a root type.
-pub(super) fn trace<T: DeserializeOwned>() -> Result<Traced<T>, SchemaError> {
+pub(super) fn trace(subject: &Subject) -> Result<Traced, SchemaError> {
     let mut registry = Registry::default();
     let mut root = Format::Unknown;
     let mut values = Vec::new();
@@ -47,14 +48,14 @@ pub(super) fn trace<T: DeserializeOwned>() -> Result<Traced<T>, SchemaError> {
                     values,
                 }),
                 other => Err(SchemaError::NotAContainer {
-                    type_name: type_name::<T>().to_owned(),
+                    type_name: subject.type_name.to_owned(),
                     found: other.to_string(),
                 }),
             };
         }
         let before = registry.progress;
         let tries = registry.tries(0);
-        let read = T::deserialize(Tracer {
+        let read = (subject.read)(Tracer {
             registry: &mut registry,
             slot: &mut root,
             site: 0,
@@ -82,14 +83,14 @@ pub(super) fn trace<T: DeserializeOwned>() -> Result<Traced<T>, SchemaError> {
         }
     }
     Err(SchemaError::Infinite {
-        type_name: type_name::<T>().to_owned(),
+        type_name: subject.type_name.to_owned(),
     })
 }
 
-impl<T: DeserializeOwned> Traced<T> {
+impl Traced {
     /// Values in which every option and collection that can hold something holds something, made of
     /// other samples each. Types that validate may refuse some.
-    pub(super) fn filled(&mut self) -> Vec<T> {
+    pub(super) fn filled(&mut self, subject: &Subject) -> Vec<Box<dyn Value>> {
         /// So many and two for each variant of the largest enum, and so many attempts for each.
         const VALUES: u32 = 6;
         const ATTEMPTS: u32 = 16;
@@ -107,7 +108,7 @@ impl<T: DeserializeOwned> Traced<T> {
                 let tries = sample + self.registry.tries(0);
                 let registry = &mut self.registry;
                 let read = guarded(|| {
-                    T::deserialize(Tracer {
+                    (subject.read)(Tracer {
                         registry,
                         slot: &mut root,
                         site: 0,
@@ -184,10 +185,7 @@ impl<'a> Tracer<'a> {
         visit: impl FnOnce(Sample) -> Result<T, Halt>,
     ) -> Result<T, Halt> {
         self.note(format)?;
-        match visit(self.sample()) {
-            Err(Halt::Refused(reason)) => Err(self.registry.refuse(self.site, reason)),
-            other => other,
-        }
+        visit(self.sample()).map_err(|halt| self.registry.halted(self.site, halt))
     }
 
     /// A tracer for a part of this value.
@@ -207,6 +205,19 @@ impl<'a> Tracer<'a> {
             tries,
             cheap,
         }
+    }
+
+    /// A tracer for a field of a container, which is closed by [`Registry::close`] or
+    /// [`Registry::close_halted`].
+    fn field<'b>(
+        registry: &'b mut Registry,
+        format: &'b mut Format,
+        context: (u64, u32, bool),
+        slot: Slot,
+    ) -> Tracer<'b> {
+        registry.trail.push(slot);
+        let step = slot.field as u64 + ((slot.variant.map_or(0, |at| at as u64 + 1)) << 32);
+        Tracer::part(registry, format, context, step)
     }
 
     fn context(&self) -> (u64, u32, bool) {
@@ -235,14 +246,51 @@ impl<'a> Tracer<'a> {
     }
 
     /// Notes a container, and whether to take the shortest way inside.
-    fn enter<V>(&mut self, name: &'static str, body: Body) -> Result<(usize, bool), Halt> {
-        let id = self.registry.container::<V>(name, body)?;
+    fn enter(
+        &mut self,
+        type_name: &'static str,
+        name: &'static str,
+        body: Body,
+    ) -> Result<(usize, bool), Halt> {
+        let id = self.registry.container(type_name, name, body)?;
         self.note(Format::Container(id))?;
         let cheap = self.cheap || self.registry.is_settled(id);
         if cheap && self.registry.depth(&Format::Container(id)) == INFINITE {
             return Err(Halt::Again);
         }
         Ok((id, cheap))
+    }
+
+    /// Notes an enum, and which of its variants to read.
+    fn enter_enum(
+        &mut self,
+        type_name: &'static str,
+        name: &'static str,
+        variants: &'static [&'static str],
+    ) -> Result<(usize, usize, bool), Halt> {
+        // The tag of an adjacently tagged enum is read as an enum of its own, by a type that
+        // only the derive macro can name.
+        if type_name.ends_with("::__Field") {
+            return Err(self.registry.unsupported(
+                name,
+                "an adjacently tagged enum (tag, content) has no fixed shape; use serde's \
+                 default form of enum",
+            ));
+        }
+        // Protobuf knows no such enum, and nothing could be read as a first value.
+        if variants.is_empty() {
+            let reason = "an enum without variants has no values; leave it out";
+            return Err(self.registry.unsupported(name, reason));
+        }
+        let each = |name: &&'static str| Variant {
+            name,
+            visits: 0,
+            fields: None,
+        };
+        let body = Body::Enum(variants.iter().map(each).collect());
+        let (id, cheap) = self.enter(type_name, name, body)?;
+        let chosen = self.registry.choose(id, cheap, self.tries)?;
+        Ok((id, chosen, cheap))
     }
 
     fn fields(self, id: usize, variant: Option<usize>, cheap: bool) -> FieldAccess<'a> {
@@ -268,7 +316,7 @@ impl<'a> Tracer<'a> {
         match visitor.visit_map(&mut access) {
             Err(Halt::Duplicate(primary)) => Err(access.duplicate(primary)),
             Ok(value) if variant.is_none() => {
-                access.refuse_hidden::<V::Value, V>()?;
+                access.refuse_hidden(Room::of::<V::Value>(), type_name::<V>())?;
                 Ok(value)
             }
             other => other,
@@ -284,17 +332,12 @@ fn read_field<S: DeserializeSeed<'static>>(
     seed: S,
 ) -> Result<S::Value, Halt> {
     let mut format = registry.format(slot);
-    registry.trail.push(slot);
-    let step = slot.field as u64 + ((slot.variant.map_or(0, |at| at as u64 + 1)) << 32);
-    let tracer = Tracer::part(registry, &mut format, context, step);
+    let tracer = Tracer::field(registry, &mut format, context, slot);
     let site = tracer.site;
-    let read = match seed.deserialize(tracer) {
-        Err(Halt::Refused(reason)) => Err(registry.refuse(site, reason)),
-        other => other,
-    };
-    let learned = registry.learn(slot, format);
-    registry.trail.pop();
-    learned.and(read)
+    match seed.deserialize(tracer) {
+        Ok(value) => registry.close(slot, format).map(|()| value),
+        Err(halt) => Err(registry.close_halted(slot, format, site, halt)),
+    }
 }
 
 /// Reads an element of a collection or tuple.
@@ -307,10 +350,8 @@ fn read_part<S: DeserializeSeed<'static>>(
 ) -> Result<S::Value, Halt> {
     let tracer = Tracer::part(registry, slot, context, step);
     let site = tracer.site;
-    match seed.deserialize(tracer) {
-        Err(Halt::Refused(reason)) => Err(registry.refuse(site, reason)),
-        other => other,
-    }
+    seed.deserialize(tracer)
+        .map_err(|halt| registry.halted(site, halt))
 }
 
 fn unknown(len: usize) -> Vec<Format> {
@@ -388,7 +429,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
     }
 
     fn deserialize_seq<V: Visitor<'static>>(mut self, visitor: V) -> Result<V::Value, Halt> {
-        refuse_hashed::<V::Value>(self.registry)?;
+        refuse_hashed(self.registry, type_name::<V::Value>())?;
         self.note(Format::Seq(Box::default()))?;
         let context = self.context();
         let Format::Seq(inner) = &*self.slot else {
@@ -404,7 +445,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
     }
 
     fn deserialize_map<V: Visitor<'static>>(mut self, visitor: V) -> Result<V::Value, Halt> {
-        refuse_hashed::<V::Value>(self.registry)?;
+        refuse_hashed(self.registry, type_name::<V::Value>())?;
         self.note(Format::Map(Box::default(), Box::default()))?;
         let context = self.context();
         let Format::Map(key, value) = &*self.slot else {
@@ -441,7 +482,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         name: &'static str,
         visitor: V,
     ) -> Result<V::Value, Halt> {
-        self.enter::<V::Value>(name, Body::Fields(Fields::Unit))?;
+        self.enter(type_name::<V::Value>(), name, Body::Fields(Fields::Unit))?;
         visitor.visit_unit()
     }
 
@@ -451,7 +492,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         visitor: V,
     ) -> Result<V::Value, Halt> {
         let body = Body::Fields(Fields::Newtype(unknown(1)));
-        let (id, cheap) = self.enter::<V::Value>(name, body)?;
+        let (id, cheap) = self.enter(type_name::<V::Value>(), name, body)?;
         // The visitor takes a deserializer, not a seed: what was learned is handed back by hand.
         let slot = Slot {
             container: id,
@@ -459,17 +500,13 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
             field: 0,
         };
         let mut format = self.registry.format(slot);
-        self.registry.trail.push(slot);
         let context = (self.site, self.tries, cheap);
-        let inner = Tracer::part(self.registry, &mut format, context, 0);
+        let inner = Tracer::field(self.registry, &mut format, context, slot);
         let site = inner.site;
-        let read = match visitor.visit_newtype_struct(inner) {
-            Err(Halt::Refused(reason)) => Err(self.registry.refuse(site, reason)),
-            other => other,
-        };
-        let learned = self.registry.learn(slot, format);
-        self.registry.trail.pop();
-        learned.and(read)
+        match visitor.visit_newtype_struct(inner) {
+            Ok(value) => self.registry.close(slot, format).map(|()| value),
+            Err(halt) => Err(self.registry.close_halted(slot, format, site, halt)),
+        }
     }
 
     fn deserialize_tuple_struct<V: Visitor<'static>>(
@@ -479,10 +516,10 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         visitor: V,
     ) -> Result<V::Value, Halt> {
         let body = Body::Fields(Fields::Tuple(unknown(len)));
-        let (id, cheap) = self.enter::<V::Value>(name, body)?;
+        let (id, cheap) = self.enter(type_name::<V::Value>(), name, body)?;
         let mut access = self.fields(id, None, cheap);
         let value = visitor.visit_seq(&mut access)?;
-        access.refuse_hidden::<V::Value, V>()?;
+        access.refuse_hidden(Room::of::<V::Value>(), type_name::<V>())?;
         Ok(value)
     }
 
@@ -493,7 +530,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         visitor: V,
     ) -> Result<V::Value, Halt> {
         let body = Body::Fields(Fields::Struct(fields, unknown(fields.len())));
-        let (id, cheap) = self.enter::<V::Value>(name, body)?;
+        let (id, cheap) = self.enter(type_name::<V::Value>(), name, body)?;
         self.struct_like(id, None, cheap, visitor)
     }
 
@@ -503,28 +540,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Halt> {
-        // The tag of an adjacently tagged enum is read as an enum of its own, by a type that
-        // only the derive macro can name.
-        if type_name::<V::Value>().ends_with("::__Field") {
-            return Err(self.registry.unsupported(
-                name,
-                "an adjacently tagged enum (tag, content) has no fixed shape; use serde's \
-                 default form of enum",
-            ));
-        }
-        // Protobuf knows no such enum, and nothing could be read as a first value.
-        if variants.is_empty() {
-            let reason = "an enum without variants has no values; leave it out";
-            return Err(self.registry.unsupported(name, reason));
-        }
-        let each = |name: &&'static str| Variant {
-            name,
-            visits: 0,
-            fields: None,
-        };
-        let body = Body::Enum(variants.iter().map(each).collect());
-        let (id, cheap) = self.enter::<V::Value>(name, body)?;
-        let chosen = self.registry.choose(id, cheap, self.tries)?;
+        let (id, chosen, cheap) = self.enter_enum(type_name::<V::Value>(), name, variants)?;
         visitor.visit_enum(VariantChoice {
             tracer: self,
             id,
@@ -535,8 +551,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
 }
 
 /// Refuses collections whose order changes between runs.
-fn refuse_hashed<V>(registry: &mut Registry) -> Result<(), Halt> {
-    let name = type_name::<V>();
+fn refuse_hashed(registry: &mut Registry, name: &str) -> Result<(), Halt> {
     if name.starts_with("std::collections::hash::") || name.starts_with("hashbrown::") {
         let reason = "its order differs between runs; use BTreeMap, BTreeSet or a sorted Vec";
         return Err(registry.unsupported(name, reason));

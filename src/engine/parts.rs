@@ -235,6 +235,14 @@ impl Parts {
         self.fault.get_or_insert_with(|| Box::new(cause));
     }
 
+    /// Notes a message of a kind that its receiver does not list.
+    #[cold]
+    pub(crate) fn not_listed(&mut self, receiver: EntityId, kind: &str) {
+        let receiver = self.topology.name(receiver).to_owned();
+        let kind = kind.to_owned();
+        self.raise(FaultCause::NotListed { receiver, kind });
+    }
+
     pub(crate) fn fault_at(
         &self,
         key: EventKey,

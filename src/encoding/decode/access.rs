@@ -23,6 +23,23 @@ impl<'r, 'p, 'b> Members<'r, 'p, 'b> {
     pub(super) fn new(reader: &'r mut Reader<'p, 'b>) -> Members<'r, 'p, 'b> {
         Members { reader, next: 0 }
     }
+
+    /// The name of the next field that is given.
+    fn next_name(&mut self) -> Result<Option<&'static str>, Fault> {
+        let message = self.reader.message;
+        while let Some(field) = message.fields.get(self.next) {
+            // Absence of one value is left to serde's default until the type turns out to have
+            // none. Absence of an option or collection says that it is empty.
+            let given = field.required.load(Ordering::Relaxed)
+                || !message.withheld.load(Ordering::Relaxed)
+                    && (field.card != Card::Single || self.reader.has(self.next)?);
+            if given {
+                return Ok(Some(field.key.name));
+            }
+            self.next += 1;
+        }
+        Ok(None)
+    }
 }
 
 impl<'b> de::MapAccess<'b> for Members<'_, '_, 'b> {
@@ -32,19 +49,10 @@ impl<'b> de::MapAccess<'b> for Members<'_, '_, 'b> {
         &mut self,
         seed: K,
     ) -> Result<Option<K::Value>, Fault> {
-        let message = self.reader.message;
-        while let Some(field) = message.fields.get(self.next) {
-            // Absence of one value is left to serde's default until the type turns out to have
-            // none. Absence of an option or collection says that it is empty.
-            let given = field.required.load(Ordering::Relaxed)
-                || !message.withheld.load(Ordering::Relaxed)
-                    && (field.card != Card::Single || self.reader.has(self.next)?);
-            if given {
-                return read_name(field.key.name, seed).map(Some);
-            }
-            self.next += 1;
+        match self.next_name()? {
+            Some(name) => read_name(name, seed).map(Some),
+            None => Ok(None),
         }
-        Ok(None)
     }
 
     fn next_value_seed<S: DeserializeSeed<'b>>(&mut self, seed: S) -> Result<S::Value, Fault> {

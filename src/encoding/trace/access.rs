@@ -20,6 +20,24 @@ pub(super) struct FieldAccess<'a> {
     layout: Layout,
 }
 
+/// A type, and the room that it takes in bytes.
+#[derive(Clone, Copy)]
+pub(super) struct Room {
+    type_name: &'static str,
+    size: usize,
+    align: usize,
+}
+
+impl Room {
+    pub(super) fn of<T>() -> Room {
+        Room {
+            type_name: type_name::<T>(),
+            size: size_of::<T>(),
+            align: align_of::<T>(),
+        }
+    }
+}
+
 /// The room that the fields read so far take, in bytes.
 #[derive(Default)]
 struct Layout {
@@ -31,8 +49,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn add<T>(&mut self) {
-        let (size, align) = (size_of::<T>(), align_of::<T>());
+    fn add(&mut self, Room { size, align, .. }: Room) {
         self.sum += size;
         self.in_order = self.in_order.next_multiple_of(align) + size;
         self.align = self.align.max(align);
@@ -40,8 +57,7 @@ impl Layout {
 
     /// True if a `T` of these fields and no others would be smaller than it is. A field that lies
     /// in what would be padding without it is not found out.
-    fn is_less_than<T>(&self) -> bool {
-        let (size, align) = (size_of::<T>(), align_of::<T>());
+    fn is_less_than(&self, Room { size, align, .. }: Room) -> bool {
         // Fields sorted by alignment need no padding but at the end.
         let found = self.sum.next_multiple_of(align);
         // A type that asks for a larger alignment itself says nothing by its size.
@@ -77,14 +93,14 @@ impl<'a> FieldAccess<'a> {
     /// Refuses a struct that has more than the fields that were read: `#[serde(skip)]` leaves no
     /// trace in what serde says of a type but its size. Derived `Deserialize` alone is held to it,
     /// which the name of its visitor tells: others may make anything of what they read.
-    pub(super) fn refuse_hidden<T, V>(&mut self) -> Result<(), Halt> {
-        let derived = type_name::<V>().contains("::__Visitor");
+    pub(super) fn refuse_hidden(&mut self, room: Room, visitor: &str) -> Result<(), Halt> {
+        let derived = visitor.contains("::__Visitor");
         let all_read = self.next == self.order.len();
-        if derived && all_read && self.layout.is_less_than::<T>() {
+        if derived && all_read && self.layout.is_less_than(room) {
             let reason = "it has a field that `#[serde(skip)]` leaves out, which would not come \
                           back where a message is copied or read from a log; write it, or keep it \
                           out of the message";
-            return Err(self.registry.unsupported(type_name::<T>(), reason));
+            return Err(self.registry.unsupported(room.type_name, reason));
         }
         Ok(())
     }
@@ -101,15 +117,29 @@ impl<'a> FieldAccess<'a> {
     }
 
     fn read<S: DeserializeSeed<'static>>(&mut self, seed: S) -> Result<S::Value, Halt> {
+        let slot = self.advance(Room::of::<S::Value>());
+        read_field(self.registry, slot, self.context, seed)
+    }
+
+    /// The next field, which takes so much room.
+    fn advance(&mut self, room: Room) -> Slot {
         let field = self.order[self.next];
         self.next += 1;
-        self.layout.add::<S::Value>();
-        let slot = Slot {
+        self.layout.add(room);
+        Slot {
             container: self.id,
             variant: self.variant,
             field,
-        };
-        read_field(self.registry, slot, self.context, seed)
+        }
+    }
+
+    /// The name of the next field, if one is left.
+    fn next_name(&self) -> Option<&'static str> {
+        let fields = self.registry.containers[self.id].fields(self.variant);
+        match (fields, self.order.get(self.next)) {
+            (Some(Fields::Struct(names, _)), Some(&at)) => Some(names[at]),
+            _ => None,
+        }
     }
 }
 
@@ -120,12 +150,8 @@ impl de::MapAccess<'static> for &mut FieldAccess<'_> {
         &mut self,
         seed: K,
     ) -> Result<Option<K::Value>, Halt> {
-        let fields = self.registry.containers[self.id].fields(self.variant);
-        let (Some(Fields::Struct(names, _)), Some(&at)) = (fields, self.order.get(self.next))
-        else {
-            return Ok(None);
-        };
-        read_name(names[at], seed).map(Some)
+        let name = self.next_name();
+        name.map(|name| read_name(name, seed)).transpose()
     }
 
     fn next_value_seed<S: DeserializeSeed<'static>>(&mut self, seed: S) -> Result<S::Value, Halt> {

@@ -89,14 +89,21 @@ impl Parts {
         let known = |known: &SampleType| known.type_id == type_id;
         match self.sample_types.iter().position(known) {
             Some(at) => at,
-            None => self.meet_sample_type::<S>(actor),
+            None => {
+                let kind = self.topology.sample_kind::<S>();
+                self.meet_sample_type(actor, type_id, std::any::type_name::<S>(), kind)
+            }
         }
     }
 
     #[cold]
-    fn meet_sample_type<S: Message>(&mut self, actor: EntityId) -> usize {
-        let (type_id, type_name) = (TypeId::of::<S>(), std::any::type_name::<S>());
-        let kind = self.topology.sample_kind::<S>();
+    fn meet_sample_type(
+        &mut self,
+        actor: EntityId,
+        type_id: TypeId,
+        type_name: &'static str,
+        kind: Result<Arc<Kind>, String>,
+    ) -> usize {
         if let Ok(kind) = &kind {
             let named =
                 |known: &&SampleType| known.kind.as_ref().is_ok_and(|k| k.name() == kind.name());
