@@ -77,10 +77,19 @@ pub(crate) struct Side {
     pub(crate) shown: u32,
     /// Those that are only counted.
     pub(crate) left_out: u64,
-    /// What a reader should know of what the page does not have.
-    pub(crate) notes: Vec<String>,
+    /// Which part of the run was asked for, unless the whole.
+    asked: Option<String>,
+    /// What a reader should know of what the page does not have, and was not asked to leave out.
+    pub(crate) warnings: Vec<String>,
     /// The time that it is to show begins behind the end of the log.
     pub(crate) is_behind_its_end: bool,
+}
+
+impl Side {
+    /// What a reader should know of what the page does not have.
+    pub(crate) fn notes(&self) -> impl Iterator<Item = &String> {
+        self.asked.iter().chain(&self.warnings)
+    }
 }
 
 /// What a log is read into.
@@ -255,16 +264,16 @@ impl Reading<'_> {
     }
 
     fn finish(mut self, path: &Path, info: &LogInfo, cut: Option<String>) -> Side {
-        let mut notes: Vec<String> = Vec::new();
-        notes.extend(self.window.note());
-        notes.extend(cut.as_ref().map(|cut| format!("The log is {cut}.")));
+        let asked = self.window.note();
+        let mut warnings: Vec<String> = Vec::new();
+        warnings.extend(cut.as_ref().map(|cut| format!("The log is {cut}.")));
         let is_cut = cut.is_some();
         let missing = info.missing.iter().filter(|_| !is_cut);
         let missing: Vec<String> = missing.map(|missing| escaped(missing)).collect();
-        notes.extend(missing);
+        warnings.extend(missing);
         if self.unreadable > 0 {
             let (count, first) = (self.unreadable, &self.first_unreadable);
-            notes.push(format!(
+            warnings.push(format!(
                 "{count} messages could not be read; the first, {first}"
             ));
         }
@@ -282,7 +291,7 @@ impl Reading<'_> {
             "farside": self.is_farside,
             "facts": facts(info),
             "scenario": info.run.as_ref().map(|run| escaped(&run.scenario)),
-            "notes": notes,
+            "notes": asked.iter().chain(&warnings).collect::<Vec<_>>(),
             "from_ns": self.window.from_ns,
             "told": self.rows.told(),
         });
@@ -294,7 +303,8 @@ impl Reading<'_> {
             details,
             shown,
             left_out,
-            notes,
+            asked,
+            warnings,
             is_behind_its_end: self.window.from_ns > 0 && !self.reaches_window,
         }
     }

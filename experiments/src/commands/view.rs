@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
             "bytes": text.len(),
             "shown": shown,
             "only_counted": left_out,
-            "notes": side.notes,
+            "notes": side.notes().collect::<Vec<_>>(),
         }))?;
     } else {
         let counted = match left_out {
@@ -95,9 +95,9 @@ pub(super) fn write(out: &Path, text: &str, inputs: &[PathBuf]) -> Result<(), Co
     output::write_whole(out, text.as_bytes(), Format::View, inputs)
 }
 
-/// Says what a page does not have.
+/// Says what a page does not have, though nobody asked to leave it out.
 pub(super) fn warn(path: &Path, side: &Side) {
-    for note in &side.notes {
-        tracing::warn!("{}: {note}", path.display());
+    for warning in &side.warnings {
+        tracing::warn!("{}: {warning}", path.display());
     }
 }

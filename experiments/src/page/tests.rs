@@ -26,7 +26,8 @@ fn hostile() -> Side {
         details: text,
         shown: 0,
         left_out: 0,
-        notes: Vec::new(),
+        asked: None,
+        warnings: Vec::new(),
         is_behind_its_end: false,
     }
 }

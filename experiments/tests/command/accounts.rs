@@ -243,3 +243,125 @@ fn hosts_wait_where_nothing_comes_for_longer_than_it_should() {
     let a = why(at, &["a"]);
     assert!(near(spent(&a, "active", "sends 1 flow"), 39.005), "{a}");
 }
+
+/// When a message was delivered [s], and its content.
+fn bodies(folder: &Path, topic: &str) -> Vec<(f64, Value)> {
+    let records = cat(folder, topic).into_iter();
+    records
+        .map(|(at_s, data)| (at_s, data["body"].clone()))
+        .collect()
+}
+
+#[test]
+fn rovers_on_tours_drive_for_as_long_as_their_commands_ran() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    run(
+        at,
+        &[
+            "misus/learn",
+            "--until",
+            "6h",
+            "--set",
+            "log.exclude=[]",
+            "--set",
+            "crash=[{ actor = 'rover_03', at = '3h', restart = '4h' }]",
+        ],
+    );
+    let given = bodies(at, "/rover_02/rover_command");
+    let reports = bodies(at, "/rover_02/hardware/command_report");
+    let end_s = 6.0 * 3600.0;
+    let ran_s = |kind: &str| -> f64 {
+        let of_kind = given
+            .iter()
+            .filter(|(_, body)| body["command"].get(kind).is_some());
+        let each = of_kind.map(|(given_s, body)| {
+            let ended = reports.iter().find(|(_, report)| report["id"] == body["id"]);
+            ended.map_or(end_s, |(ended_s, _)| *ended_s) - given_s
+        });
+        each.sum()
+    };
+    let story = why(at, &["rover_02"]);
+    assert_whole(&story);
+    for (kind, says) in [
+        ("drive", "drives to"),
+        ("image", "takes an image"),
+        ("spectrum", "takes a spectrum"),
+    ] {
+        let (told_s, ran_s) = (spent(&story, "active", says), ran_s(kind));
+        assert!(
+            ran_s > 60.0 && near(told_s, ran_s),
+            "{kind}: {told_s} {ran_s}"
+        );
+    }
+    assert_eq!(
+        why(at, &["rover_02/hardware"])["account"],
+        story["account"]
+    );
+    // The others do not stop while one is down.
+    assert_eq!(spent(&story, "down", ""), 0.0);
+    let down = why(at, &["rover_03"]);
+    assert_whole(&down);
+    assert!(near(spent(&down, "down", "is down"), 3600.0), "{down}");
+}
+
+#[test]
+fn planners_wait_for_whose_plans_they_have_not_heard_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    run(
+        at,
+        &[
+            "misus/planners",
+            "--set",
+            "log.exclude=[]",
+            "--set",
+            "links.\"rover_03-rover_02\".latency='9s'",
+        ],
+    );
+    let begun = cat(at, "/timer/rover_02/step_begins");
+    let made = cat(at, "/state/rover_02/planner_step");
+    assert_eq!((begun.len(), made.len()), (20, 20));
+    let planned_s: f64 = begun.iter().zip(&made).map(|(from, to)| to.0 - from.0).sum();
+    let story = why(at, &["rover_02"]);
+    assert_whole(&story);
+    let told_s = spent(&story, "active", "makes step");
+    assert!(
+        planned_s > 0.5 && near(told_s, planned_s),
+        "{told_s} {planned_s}"
+    );
+    // For each of the others: from the end of a step of its own until it hears that theirs is made.
+    let waited_for_s = |other: &str| -> f64 {
+        let phases = story["account"].as_array().unwrap().iter();
+        let waits = phases.filter(|phase| {
+            let waits_for = phase["waits_for"].as_array().unwrap();
+            waits_for.contains(&Value::from(other))
+        });
+        let each = waits.map(|phase| {
+            phase["until_s"].as_f64().unwrap() - phase["from_s"].as_f64().unwrap()
+        });
+        each.sum()
+    };
+    let heard_late_s = |other: &str| -> f64 {
+        let held = cat(at, &format!("/{other}/plan_held"));
+        let to_it = held
+            .iter()
+            .filter(|(_, data)| data["receiver"] == "rover_02");
+        let heard: Vec<(f64, u64)> = to_it
+            .map(|(at_s, data)| (*at_s, data["body"]["steps"].as_u64().unwrap()))
+            .collect();
+        let each = made.iter().map(|(made_s, step)| {
+            let steps = step["steps"].as_u64().unwrap();
+            let first = heard.iter().find(|(_, theirs)| *theirs >= steps);
+            (first.unwrap_or_else(|| panic!("step {steps}")).0 - made_s).max(0.0)
+        });
+        each.sum()
+    };
+    for (other, least_s) in [("rover_01", 0.5), ("rover_03", 170.0)] {
+        let (told_s, heard_s) = (waited_for_s(other), heard_late_s(other));
+        assert!(
+            heard_s > least_s && near(told_s, heard_s),
+            "{other}: {told_s} {heard_s}"
+        );
+    }
+}

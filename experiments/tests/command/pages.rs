@@ -218,6 +218,8 @@ fn a_part_of_a_run_is_shown_from_where_things_stood() {
             .contains("from 4s to 6.5s"),
         "{part}"
     );
+    // Nobody is warned of what was asked for.
+    assert_eq!(text(&output.stderr), "");
     for span in [
         ["--from", "5s", "--at", "4s"],
         ["--from", "99h", "--at", "100h"],
