@@ -2,17 +2,17 @@
 //! lie on the ground, and choose by that what to look at next.
 //!
 //! After T. Estlin, D. Gaines, F. Fisher and R. Castano, "Coordinating Multiple Rovers with
-//! Interdependent Science Objectives", AAMAS 2005. Built so far: its environment (section 2), as
-//! rock fields of [`farside_worlds`] and rover hardware of [`farside_actors::rover`], and its data
-//! [`analysis`], which runs distributed over the rovers. Tours are fixed; [`planner`] has the planners of
-//! sections 3 and 4, and [`planning`] puts them into actors: the paper's evaluation (section 5), and the same
-//! over links that are not perfect.
+//! Interdependent Science Objectives", AAMAS 2005:
 //!
-//! On each rover there are two actors: the hardware, and the scientist, who sends the rover from rock
-//! to rock, exchanges what is read with the other scientists, and learns from all of it.
+//! - its environment (section 2), as rock fields of [`farside_worlds`] and rover hardware of
+//!   [`farside_actors::rover`], and its data [`analysis`], which runs distributed over the rovers: the system
+//!   [`MisusSystem`], on fixed or prioritised [`tour`]s;
+//! - its [`planner`]s (sections 3 and 4), and actors that exchange their plans over links ([`planning`]), by
+//!   which the paper's evaluation (section 5) is repeated: the system [`PlanningSystem`];
+//! - the sharing of goals over bad links (section 3.2): the language [`shac`], and actors ([`sharing`]);
+//! - all of it as one loop, plans carried out ([`survey`]): the system [`SurveySystem`].
 //!
-//! How goals are shared over bad links ([`shac`], its section 3.2) is there by itself, with actors
-//! ([`sharing`]) that planners are to be put into.
+//! On each rover there are two actors at least: the hardware, and who commands it.
 
 pub mod analysis;
 mod assemble;

@@ -276,7 +276,9 @@ fn rovers_on_tours_drive_for_as_long_as_their_commands_ran() {
             .iter()
             .filter(|(_, body)| body["command"].get(kind).is_some());
         let each = of_kind.map(|(given_s, body)| {
-            let ended = reports.iter().find(|(_, report)| report["id"] == body["id"]);
+            let ended = reports
+                .iter()
+                .find(|(_, report)| report["id"] == body["id"]);
             ended.map_or(end_s, |(ended_s, _)| *ended_s) - given_s
         });
         each.sum()
@@ -294,10 +296,7 @@ fn rovers_on_tours_drive_for_as_long_as_their_commands_ran() {
             "{kind}: {told_s} {ran_s}"
         );
     }
-    assert_eq!(
-        why(at, &["rover_02/hardware"])["account"],
-        story["account"]
-    );
+    assert_eq!(why(at, &["rover_02/hardware"])["account"], story["account"]);
     // The others do not stop while one is down.
     assert_eq!(spent(&story, "down", ""), 0.0);
     let down = why(at, &["rover_03"]);
@@ -322,7 +321,11 @@ fn planners_wait_for_whose_plans_they_have_not_heard_of() {
     let begun = cat(at, "/timer/rover_02/step_begins");
     let made = cat(at, "/state/rover_02/planner_step");
     assert_eq!((begun.len(), made.len()), (20, 20));
-    let planned_s: f64 = begun.iter().zip(&made).map(|(from, to)| to.0 - from.0).sum();
+    let planned_s: f64 = begun
+        .iter()
+        .zip(&made)
+        .map(|(from, to)| to.0 - from.0)
+        .sum();
     let story = why(at, &["rover_02"]);
     assert_whole(&story);
     let told_s = spent(&story, "active", "makes step");
@@ -337,9 +340,8 @@ fn planners_wait_for_whose_plans_they_have_not_heard_of() {
             let waits_for = phase["waits_for"].as_array().unwrap();
             waits_for.contains(&Value::from(other))
         });
-        let each = waits.map(|phase| {
-            phase["until_s"].as_f64().unwrap() - phase["from_s"].as_f64().unwrap()
-        });
+        let each = waits
+            .map(|phase| phase["until_s"].as_f64().unwrap() - phase["from_s"].as_f64().unwrap());
         each.sum()
     };
     let heard_late_s = |other: &str| -> f64 {
