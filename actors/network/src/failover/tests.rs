@@ -694,3 +694,24 @@ fn no_path_is_taken_that_a_replaced_region_has_half_of() {
     let detail = report.end.detail();
     assert_eq!(metrics.arrived, 37, "{detail} {:?}", metrics.failed_over);
 }
+
+/// A path passes a region twice, and another one between: that one is replaced when the confirmation has
+/// come to the first part and not to the second. Those behind are told as well.
+#[test]
+fn a_confirmation_that_is_lost_between_two_parts_of_a_region_is_said_again() {
+    let trial = Trial {
+        rovers: 10,
+        link: Bad {
+            loss: 0.144_798_581_982_081_5,
+            jitter_ms: 295,
+            ..GOOD
+        },
+        crashes: vec![(20, 7746, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 989)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 10, "{detail} {:?}", metrics.failed_over);
+}

@@ -500,3 +500,8 @@ fn owners(desk: &Desk<'_>, path: &[TimedVisit]) -> Vec<NodeId> {
     owners.dedup();
     owners
 }
+
+/// The place in a path's [`owners`] of who owns this visit.
+fn place_of(desk: &Desk<'_>, path: &[TimedVisit], visit: usize) -> u32 {
+    owners(desk, &path[..=visit]).len() as u32 - 1
+}

@@ -20,7 +20,7 @@
 
 use farside_worlds::NodeId;
 
-use super::{Desk, Origin, Registry, owners};
+use super::{Desk, Origin, Registry, owners, place_of};
 use crate::failover::messages::Account;
 use crate::reservation::messages::{
     Item, Itinerary, ItineraryAnswer, ReservationRequest, Reserve, Settle, Verdict,
@@ -53,9 +53,12 @@ impl RegionFailover {
         }
     }
 
-    /// What is open of a request is so no more.
-    pub(crate) fn close(&mut self, request: &ReservationRequest) {
-        self.open.retain(|reserve| reserve.request != *request);
+    /// What became of a request has come to place `at` of its route: up to there nothing is open any
+    /// more. What is beyond waits until it has come there too, also in the same region.
+    fn close(&mut self, desk: &Desk<'_>, request: &ReservationRequest, at: u32) {
+        let place = |open: &Reserve| place_of(desk, &open.path, open.at as usize + 1);
+        self.open
+            .retain(|open| open.request != *request || place(open) > at);
     }
 
     pub(crate) fn is_proposed(&self, request: &ReservationRequest) -> bool {
@@ -69,7 +72,7 @@ impl RegionFailover {
         attempt_began < self.since
     }
 
-    pub(crate) fn take(&mut self, request: ReservationRequest) {
+    fn take(&mut self, request: ReservationRequest) {
         if !self.taken.contains(&request) {
             self.taken.push(request);
         }
@@ -77,6 +80,20 @@ impl RegionFailover {
 }
 
 impl Registry {
+    /// What became of a request has come to place `at` of its route.
+    pub(crate) fn note_settled(
+        &mut self,
+        desk: &Desk<'_>,
+        request: &ReservationRequest,
+        verdict: Verdict,
+        at: u32,
+    ) {
+        self.failover.close(desk, request, at);
+        if verdict == Verdict::Confirmed {
+            self.failover.take(*request);
+        }
+    }
+
     /// Whether a path that is to be reserved was taken already: then that is said again, to whom it
     /// was lost on.
     pub(crate) fn is_taken(&mut self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
@@ -88,7 +105,7 @@ impl Registry {
             request: reserve.request,
             verdict: Verdict::Confirmed,
             route: owners(desk, &reserve.path),
-            at: owners(desk, &reserve.path[..=reserve.at as usize]).len() as u32 - 1,
+            at: place_of(desk, &reserve.path, reserve.at as usize),
         };
         self.forward(confirmed);
         true

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use farside_worlds::{NodeId, VertexId};
 
-use super::{Aim, Desk, Offers, Origin, Question, Registry, owners};
+use super::{Aim, Desk, Offers, Origin, Question, Registry, owners, place_of};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
 use crate::reservation::messages::{
@@ -272,7 +272,7 @@ impl Registry {
 
     /// The whole path is entered: from here on it holds.
     pub(crate) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
-        self.settled(desk, &reserve.request, Verdict::Confirmed);
+        self.settled(desk, &reserve.request, Verdict::Confirmed, 0);
         if desk.site.stay_at_target {
             let TimedVisit { vertex, end, .. } = reserve.path[0];
             self.table.leave_by(vertex, end);
@@ -289,31 +289,36 @@ impl Registry {
         self.unpark(desk);
     }
 
-    /// What this region has of a request holds, or is struck out.
-    fn settled(&mut self, desk: &Desk<'_>, request: &ReservationRequest, verdict: Verdict) {
+    /// What this region has of a request holds, or is struck out: that has come to place `at` of its
+    /// route.
+    fn settled(
+        &mut self,
+        desk: &Desk<'_>,
+        request: &ReservationRequest,
+        verdict: Verdict,
+        at: u32,
+    ) {
         match verdict {
             Verdict::Confirmed => self.table.confirm(request),
             _ => self.table.strike(request),
         }
         if desk.may_be_replaced() {
-            self.failover.close(request);
-            if verdict == Verdict::Confirmed {
-                self.failover.take(*request);
-            }
+            self.note_settled(desk, request, verdict, at);
         }
     }
 
     /// Strikes out all of a path that was entered, from visit `lo` on.
     pub(crate) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
+        let at = place_of(desk, &reserve.path, lo);
         let released = Settle {
             request: reserve.request,
             verdict: Verdict::Released,
             route: owners(desk, &reserve.path),
-            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
+            at,
         };
         self.forward(released);
         // A route may pass this region twice.
-        self.settled(desk, &reserve.request, Verdict::Released);
+        self.settled(desk, &reserve.request, Verdict::Released, at);
         self.unpark(desk);
     }
 
@@ -324,7 +329,7 @@ impl Registry {
             request: reserve.request,
             verdict: Verdict::Failed,
             route: owners(desk, &reserve.path),
-            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
+            at: place_of(desk, &reserve.path, lo),
         };
         self.fail(desk, failed);
     }
@@ -375,13 +380,14 @@ impl Registry {
     }
 
     pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
-        match settle.verdict {
+        let (request, verdict, at) = (settle.request, settle.verdict, settle.at);
+        match verdict {
             Verdict::Failed | Verdict::NoPath => return self.fail(desk, settle),
             Verdict::Confirmed => {
-                self.settled(desk, &settle.request, Verdict::Confirmed);
-                self.return_later(desk, &settle.request);
+                self.settled(desk, &request, verdict, at);
+                self.return_later(desk, &request);
             }
-            Verdict::Released => self.settled(desk, &settle.request, Verdict::Released),
+            Verdict::Released => self.settled(desk, &request, verdict, at),
         }
         self.forward(settle);
         self.unpark(desk);
