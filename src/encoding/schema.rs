@@ -11,7 +11,8 @@ use super::error::{DecodeError, EncodeError, SchemaError};
 use super::flat::FlatSchema;
 use crate::guard::dropped;
 
-use super::subject::{Subject, Value};
+use super::sampled::Sampled;
+use super::trace::Subject;
 use super::{decode, descriptor, encode, lower, symmetry, trace, wire};
 
 /// The protobuf package of every message kind.
@@ -157,7 +158,7 @@ impl Schema {
     }
 }
 
-fn drop_samples(samples: impl Iterator<Item = Box<dyn Value>>) {
+fn drop_samples(samples: impl Iterator<Item = Box<dyn Sampled>>) {
     for sample in samples {
         // What panics with a sample need not with what a run has.
         let _ = dropped(sample);

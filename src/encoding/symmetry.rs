@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 
 use super::error::{EncodeError, SchemaError};
 use super::flat::{Field, FlatSchema, Shape, ValueType};
-use super::subject::Value;
+use super::sampled::Sampled;
 use super::wire::take_field;
 use crate::guard::{dropped, guarded};
 
@@ -25,8 +25,8 @@ struct Written {
 pub(super) fn check(
     type_name: &str,
     flat: &FlatSchema,
-    met: &[Box<dyn Value>],
-    filled: &[Box<dyn Value>],
+    met: &[Box<dyn Sampled>],
+    filled: &[Box<dyn Sampled>],
 ) -> Result<(), SchemaError> {
     let check = Check { flat };
     let refused = |reason: String| SchemaError::Asymmetric {
@@ -51,7 +51,7 @@ struct Check<'a> {
 
 impl Check<'_> {
     /// Writes a value. None if the type itself refuses to, as it may with samples.
-    fn write(&self, value: &dyn Value) -> Result<Option<Written>, String> {
+    fn write(&self, value: &dyn Sampled) -> Result<Option<Written>, String> {
         self.fields().for_each(|(_, field)| {
             field.left_out.store(false, Ordering::Relaxed);
         });
@@ -78,7 +78,7 @@ impl Check<'_> {
     }
 
     /// What was read of a written value is written again as it was.
-    fn comes_back(&self, value: &dyn Value) -> Result<(), String> {
+    fn comes_back(&self, value: &dyn Sampled) -> Result<(), String> {
         let Some(written) = self.write(value)? else {
             return Ok(());
         };
@@ -105,7 +105,7 @@ impl Check<'_> {
     }
 
     /// Every field of a struct is written for some value in which everything is there.
-    fn all_is_written(&self, filled: &[Box<dyn Value>]) -> Result<(), String> {
+    fn all_is_written(&self, filled: &[Box<dyn Sampled>]) -> Result<(), String> {
         let (mut present, mut met) = (BTreeSet::new(), BTreeSet::new());
         for value in filled {
             if let Some(written) = self.write(&**value)? {
@@ -126,7 +126,7 @@ impl Check<'_> {
     }
 
     /// What `Deserialize` takes where fields of this message are missing comes back as well.
-    fn defaults_come_back(&self, id: usize, filled: &[Box<dyn Value>]) -> Result<(), String> {
+    fn defaults_come_back(&self, id: usize, filled: &[Box<dyn Sampled>]) -> Result<(), String> {
         /// Defaults seldom hang on the fields beside them.
         const VALUES: usize = 2;
         for value in filled.iter().take(VALUES) {

@@ -5,16 +5,17 @@
 //! repeated until nothing is. What cannot be continued (a value of a type inside itself, a sample
 //! that the type refused) ends the pass, and the next one knows better.
 
-use std::any::type_name;
+use std::any::{TypeId, type_name};
 use std::fmt;
 
-use serde::de::{self, DeserializeSeed, IntoDeserializer, Visitor};
+use serde::Serialize;
+use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Visitor};
 
 use super::error::SchemaError;
 use super::format::{Body, Container, Fields, Format, Variant, merge};
 use super::registry::{Halt, INFINITE, Registry, Slot};
+use super::sampled::Sampled;
 use super::samples::{Sample, mix};
-use super::subject::{Subject, Value};
 use crate::guard::guarded;
 
 mod access;
@@ -26,11 +27,29 @@ const MAX_PASSES: usize = 10_000;
 /// So many values are kept to check that `Serialize` agrees.
 const MAX_VALUES: usize = 256;
 
+/// A type that is traced.
+pub(super) struct Subject {
+    pub(super) type_name: &'static str,
+    pub(super) id: TypeId,
+    /// Reads a value from samples.
+    read: fn(Tracer<'_>) -> Result<Box<dyn Sampled>, Halt>,
+}
+
+impl Subject {
+    pub(super) fn of<T: Serialize + DeserializeOwned + 'static>() -> Subject {
+        Subject {
+            type_name: type_name::<T>(),
+            id: TypeId::of::<T>(),
+            read: |tracer| Ok(Box::new(T::deserialize(tracer)?)),
+        }
+    }
+}
+
 /// The shape of a type, and values that were read on the way.
 pub(super) struct Traced {
     pub(super) registry: Registry,
     pub(super) root: usize,
-    pub(super) values: Vec<Box<dyn Value>>,
+    pub(super) values: Vec<Box<dyn Sampled>>,
 }
 
 /// Traces a root type.
@@ -90,7 +109,7 @@ pub(super) fn trace(subject: &Subject) -> Result<Traced, SchemaError> {
 impl Traced {
     /// Values in which every option and collection that can hold something holds something, made of
     /// other samples each. Types that validate may refuse some.
-    pub(super) fn filled(&mut self, subject: &Subject) -> Vec<Box<dyn Value>> {
+    pub(super) fn filled(&mut self, subject: &Subject) -> Vec<Box<dyn Sampled>> {
         /// So many and two for each variant of the largest enum, and so many attempts for each.
         const VALUES: u32 = 6;
         const ATTEMPTS: u32 = 16;
