@@ -74,13 +74,34 @@ impl Account {
         done.last().map(|first| first.from_ns)
     }
 
-    /// Adds a phase: one that says the same as the last goes on with it, and one without length is nothing.
+    /// Adds a phase: one that says the same as the last and waits for the same goes on with it, and one
+    /// without length is nothing.
+    ///
+    /// ```
+    /// use farside_actors::system::{Account, Doing, Phase};
+    /// let mut account = Account::default();
+    /// for (from_ns, waits_for) in [(0, &["a", "b"][..]), (1, &["a", "b"]), (2, &["b"])] {
+    ///     account.push(Phase {
+    ///         from_ns,
+    ///         until_ns: from_ns + 1,
+    ///         doing: Doing::Waiting,
+    ///         text: "waits for plans".to_owned(),
+    ///         waits_for: waits_for.iter().map(|name| (*name).to_owned()).collect(),
+    ///     });
+    /// }
+    /// let until: Vec<u64> = account.phases.iter().map(|phase| phase.until_ns).collect();
+    /// assert_eq!(until, [2, 3]);
+    /// ```
     pub fn push(&mut self, phase: Phase) {
         if phase.until_ns <= phase.from_ns && phase.doing != Doing::Done {
             return;
         }
         match self.phases.last_mut() {
-            Some(last) if last.doing == phase.doing && last.text == phase.text => {
+            Some(last)
+                if last.doing == phase.doing
+                    && last.text == phase.text
+                    && last.waits_for == phase.waits_for =>
+            {
                 last.until_ns = phase.until_ns;
             }
             _ => self.phases.push(phase),
